@@ -1,4 +1,4 @@
-"""Reading a text about a way: its acts, and where they end on a building, with odds."""
+"""Reading a text about a way: the tree of its words, its acts, and where they end on a building, with odds."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
+
+from lark import Tree
 
 from harvey_words.following.word_follower import WordFollower
 from harvey_words.following.word_map import Point, WordMap
@@ -67,11 +69,12 @@ class Reading:
     """What was read.
 
     Attributes:
-        acts: what it asks to do and to see.
+        tree: of the text, as the grammar has it; acts: what it asks to do and to see.
         ends: where it may lead, best first; unused: phrases that fitted nothing in the best reading.
     """
 
     text: str
+    tree: Tree[Any]
     acts: tuple[Act, ...]
     ends: tuple[RouteEnd, ...]
     unused: tuple[str, ...] = field(default=())
@@ -93,7 +96,13 @@ class Reading:
             "rivals": [end.as_data() for end in self.ends[1:6]],
             "way": [list(place) for place in self.end.way] if self.end else [],
             "acts": [{"act": act.sort, "text": act.text, **({"way": act.way} if act.way else {})} for act in self.acts],
-            "unused": list(self.unused)}
+            "unused": list(self.unused), "tree": _tree_data(self.tree)}
+
+
+def _tree_data(node: Any) -> Any:
+    if isinstance(node, Tree):
+        return [str(node.data), *(_tree_data(child) for child in node.children)]
+    return f"{node.value.sort}:{node.value.meaning}"
 
 
 def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: str | Sequence[float],
@@ -112,11 +121,12 @@ def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: s
     """
     plan = world if isinstance(world, WordMap) else WordMap(world if isinstance(world, World) else load_world(world))
     begin = _begin(plan, start, heading_deg)
-    acts = read_acts(read_clauses(plan.lexicon.read(text)))
+    tree, clauses = read_clauses(plan.lexicon.read(text))
+    acts = read_acts(clauses)
     states = WordFollower(plan).follow(begin, acts) if acts else []
     ends = _weigh_ends(states)
     misfits = states[0].misfits if states else ()
-    return Reading(text, tuple(acts), ends, tuple(acts[number].text for number in misfits if number < len(acts)))
+    return Reading(text, tree, tuple(acts), ends, tuple(acts[number].text for number in misfits if number < len(acts)))
 
 
 def _begin(plan: WordMap, start: str | Sequence[float], heading_deg: float | None) -> list[State]:

@@ -1,20 +1,42 @@
-"""From the words of a text to its clauses: rows of parts. Every row of words has a reading: people write no grammar.
+"""From the words of a text to its clauses: a grammar over the classes of the words.
 
-    clause: part+ separator?
-    part:   verb | way | not | thing | where
-    thing:  noun ("of" noun)*               the end of the brick hall, the corner with the chair
-    noun:   count* named+ | count+
-    where:  prep prep? (way side? | thing)  up to the wall, on the left hand side, past it
+The tree of lark is the reading of the text by itself; what it means on a building is found by following it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise, takewhile
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from lark import Lark, Token, Tree
+from lark.lexer import Lexer
 
 from harvey_words.reading.lexicon import Word
 from harvey_words.reading.told_acts import COMPASS
+
+
+class WordLexer(Lexer):
+    """Hands the words on as tokens; made for lark, which calls it."""
+
+    def __init__(self, lexer_conf: Any) -> None:
+        """Nothing of lark's own lexer is used."""
+
+    def lex(self, data: Sequence[Word], parser_state: Any = None) -> Iterator[Token]:  # type: ignore[override]
+        """A token a word, with the word as its value."""
+        for word in data:
+            sort = word.sort
+            if sort == "HEAD" and word.meaning == "side":
+                sort = "SIDE"
+            elif sort == "PREP" and word.meaning == "of":
+                sort = "OF"
+            token = Token(sort, word.text)
+            token.value = word
+            yield token
+
 
 STARTS = frozenset(
     ("go", "turn", "take", "face", "reach", "enter", "through", "exit", "pass", "halt", "stand", "there"))
@@ -24,6 +46,13 @@ STATING = frozenset(("has", "have"))
 """Words that say of a place what is there, and do not tell it from others by that."""
 MOST_BETWEEN = 6
 """Words between the two that are joined by ``and``."""
+
+
+@cache
+def parser() -> Lark:
+    """The parser of the grammar."""
+    grammar = Path(__file__).with_name("grammar.lark").read_text(encoding="utf-8")
+    return Lark(grammar, parser="lalr", lexer=WordLexer)
 
 
 @dataclass(frozen=True)
@@ -51,27 +80,32 @@ class Clause:
     end: str = ""
 
 
-def read_clauses(words: Sequence[Word]) -> list[Clause]:
-    """The clauses of a text."""
-    clauses, clause = list[Clause](), Clause()
-    for part in _read_parts(list(_mend(words))):
-        if part.sort == "sep":
-            clause.end = part.meaning
-            clauses += _split_turns(clause)
-            clause = Clause()
-        elif part.meaning == "be" and clause.parts[-1:] and clause.parts[-1].sort == "thing" and any(
-                one.meaning == "exit" for one in clause.parts):
-            thing = clause.parts.pop()  # "when you come out of the lab the office is on the left"
-            clauses.append(clause)
-            clause = Clause([thing, part])
-        elif part.meaning in STARTS and part.sort == "verb" and not (  # "your back faces the wall" is no turn
-                part.meaning == "face" and [one.meaning for one in clause.parts[-1:]] == ["back"]) and any(
-                one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
-            clauses.append(clause)
-            clause = Clause([part])
-        else:
-            clause.parts.append(part)
-    return [*clauses, *(_split_turns(clause) if clause.parts else ())]
+def read_clauses(words: Sequence[Word]) -> tuple[Tree[Any], list[Clause]]:
+    """The tree of a text, and its clauses."""
+    kept = list(_mend(words))
+    tree = parser().parse(kept)
+    clauses: list[Clause] = []
+    for node in tree.children:
+        assert isinstance(node, Tree)
+        clause = Clause()
+        for child in node.children:
+            part = _read_part(child)
+            if part.sort == "sep":
+                clause.end = part.meaning
+            elif part.meaning == "be" and clause.parts[-1:] and clause.parts[-1].sort == "thing" and any(
+                    one.meaning == "exit" for one in clause.parts):
+                thing = clause.parts.pop()  # "when you come out of the lab the office is on the left"
+                clauses.append(clause)
+                clause = Clause([thing, part])
+            elif part.meaning in STARTS and part.sort == "verb" and not (  # "your back faces the wall" is no turn
+                    part.meaning == "face" and [one.meaning for one in clause.parts[-1:]] == ["back"]) and any(
+                    one.sort in ("thing", "where", "way") or one.meaning == "exit" for one in clause.parts):
+                clauses.append(clause)
+                clause = Clause([part])
+            else:
+                clause.parts.append(part)
+        clauses += _split_turns(clause)
+    return tree, clauses
 
 
 def _split_turns(clause: Clause) -> Iterator[Clause]:
@@ -155,38 +189,24 @@ def _join_meetings(words: Sequence[Word]) -> list[Word]:
     return joined
 
 
-def _read_parts(words: Sequence[Word]) -> Iterator[Part]:
-    """The parts of a text, one after the other; a description is as long as it can be."""
-    place = 0
-    while place < len(words):
-        preps = [word.meaning for word in takewhile(lambda one: one.sort == "PREP" and one.meaning != "of",
-                                                          words[place:place + 2])]
-        place += len(preps)
-        word = words[place] if place < len(words) else None
-        thing = _take_thing(words, place)
-        if preps and word is not None and word.sort == "WAY":
-            yield Part("where", preps[-1], (), word.meaning)
-            place += 1 + any(one.meaning == "side" for one in words[place + 1:place + 2])  # "on the left hand side"
-        elif preps:
-            strong = [prep for prep in preps if prep not in ("along", "at", "on", "in")]
-            yield Part("where", (strong or [preps[-1]])[0], tuple(one for one in thing if one.meaning != "of"))
-            place += len(thing)
-        elif thing:
-            yield Part("thing", "", tuple(one for one in thing if one.meaning != "of"))
-            place += len(thing)
-        elif word is not None:
-            yield Part(word.sort.lower(), word.meaning, (word,))
-            place += 1
+def _read_part(node: Any) -> Part:
+    """A part from its branch of the tree."""
+    words = tuple(_words_of(node))
+    first = words[0]
+    if node.data == "where":
+        preps = [word for word in words if word.sort == "PREP"]
+        inner = next((child for child in node.children if isinstance(child, Tree)), None)
+        if inner is not None and inner.data == "side":
+            return Part("where", preps[-1].meaning, (), next(iter(_words_of(inner))).meaning)
+        things = tuple(_words_of(inner)) if inner is not None else ()
+        strong = [prep.meaning for prep in preps if prep.meaning not in ("along", "at", "on", "in")]
+        return Part("where", (strong or [preps[-1].meaning])[0], things)
+    if node.data == "thing":
+        return Part("thing", "", words)
+    return Part(str(node.data), first.meaning, words)
 
 
-def _take_thing(words: Sequence[Word], place: int) -> list[Word]:
-    """The words of a description that begins here: a number after a name begins another."""
-    taken: list[Word] = []
-    for word in words[place:]:
-        is_next = not taken or taken[-1].meaning == "of"
-        if word.sort not in NOUNS and (is_next or word.meaning != "of"):
-            break
-        if word.sort == "COUNT" and not is_next and taken[-1].sort != "COUNT":
-            break
-        taken.append(word)
-    return taken
+def _words_of(node: Any) -> Iterator[Word]:
+    for token in node.scan_values(lambda value: isinstance(value, Token)):
+        if token.value.meaning != "of":
+            yield token.value
