@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,19 @@ class History:
                 woke[by["author"], chosen["source"], by["type"]] += 1
         edges = (f'  "{one}" -> "{other}" [label="{kind} x {times}"]' for (one, other, kind), times in woke.items())
         return "\n".join(("digraph {", *edges, "}"))
+
+    def parts_from(self, other: History) -> str:
+        """The first cycle in which two runs differ, and in what, in words; "" where they are the same."""
+        for cycle, (one, two) in enumerate(zip_longest(self.lines, other.lines), 1):
+            if one == two:
+                continue
+            if one is None or two is None:
+                return f"cycle {cycle}: the {'first' if one is None else 'second'} run has ended"
+            first, second = json.loads(one), json.loads(two)
+            key = next(key for key in {**first, **second} if first.get(key) != second.get(key))
+            ours, theirs = _brief(first.get(key)), _brief(second.get(key))
+            return f"cycle {cycle}: {key} is {ours} in the first run, {theirs} in the second"
+        return ""
 
     def _note(self, line: str) -> None:
         decision = json.loads(line)

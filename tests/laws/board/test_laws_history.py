@@ -68,6 +68,7 @@ def test_saved_and_read_it_is_the_same_and_decided_again_it_is_the_same(texts: l
     _, history = drive(texts)
     again = History(history.lines)
     assert again.lines == history.lines and again.replay(Scheduler(SOURCES)) is None
+    assert again.parts_from(history) == ""
 
 
 def test_it_is_written_and_read(tmp_path: Path) -> None:
@@ -78,11 +79,17 @@ def test_it_is_written_and_read(tmp_path: Path) -> None:
         History([history.lines[0], '"nonsense"'])
 
 
-@given(TEXTS, st.sampled_from((0.1, 0.9)))
-def test_other_sources_part_in_the_first_cycle_that_differs(texts: list[str], priority: float) -> None:
+@given(texts=TEXTS, at=st.integers(0, 4), priority=st.sampled_from((0.1, 0.9)))
+def test_other_sources_or_other_words_part_in_the_first_cycle_that_differs(
+    texts: list[str], at: int, priority: float
+) -> None:
     _, history = drive(texts)
     hurried = type("counter", (type(counter),), {"priority": priority})()
     assert history.replay(Scheduler([hurried, complainer])) == 1  # the rating stands in the first line
+    at = min(at, len(texts))
+    _, other = drive([*texts[:at], "other", *texts[at:]])
+    alike = next(i for i, (a, b) in enumerate(zip([*history.lines, ""], other.lines, strict=False)) if a != b)
+    assert history.parts_from(other).startswith(f"cycle {alike + 1}: ")
 
 
 @given(TEXTS)
