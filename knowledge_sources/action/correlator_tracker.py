@@ -75,16 +75,16 @@ class CorrelatorTracker(RobotKnowledgeSource):
         frame, held, old = case
         belief, image = held.entry, rectify(held.robot, frame)
         followed = [] if old is None else self._follow(view, held, old.value.items, image)
-        tracks = [f.track for f in followed]
-        seen = [track for track in tracks if track.found_px is not None]
+        seen = [f.track for f in followed if f.track.found_px is not None]
         because = (frame, belief) if old is None else (frame, belief, old)
         corrected, agreeing = self._correct(held, seen, old.value.anchors) if seen and old else (None, 0)
-        expected, unseen = sum(f.expected for f in followed), 0 if seen or old is None else old.value.unseen + 1
+        expected, unseen = sum(1 for f in followed if f.expected), 0 if seen or old is None else old.value.unseen + 1
         bare = find_missing_floors(view, unseen)
         what = f"no landmark in {unseen} pictures, and the floor is nowhere free where it should be" if bare else ""
         if expected >= MIN_EXPECTED_LANDMARKS and agreeing < MIN_AGREEING_PART * expected:
             what = f"{expected - agreeing} of {expected} landmarks are not where they were expected{tell_worst(seen)}"
         if what:
+            tracks = [f.track for f in followed]
             yield from self._post_discrepancy(view, what, math.inf, held, tracks, (*because, *bare))
             yield post_or_revise(old, Tracks(frame.id, TEMPLATE_HALF_PX, ()), because)
             return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache
 
 import numpy as np
 
@@ -19,8 +18,7 @@ from knowledge_sources.methods.calibration import (
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import CAMERA, HELD, is_worth_telling
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.camera import Camera, CameraMount
-from world_models.entries import CameraState, Evidence, Explanation, LineMatch, PoseFix
+from world_models.entries import Evidence, PoseFix
 
 ABOUT = "camera"
 
@@ -42,9 +40,12 @@ class LensMonitor(RobotKnowledgeSource):
         milestone = None if match is None else view.get(match.value.milestone)
         if match is None or milestone is None or milestone.value.is_inexact:
             return None
-        m, pairs, robot = milestone.value, match.value, HELD.of(view).robot
-        names = tuple(m.landmarks[m.landmark_of[line]] for line in pairs.pairs[:, 0])
-        explained = _explain(fix, pairs, names, robot.camera, robot.mount, CAMERA.of(view).value)
+        m, pairs = milestone.value, match.value
+        robot, known = HELD.of(view).robot, compute_camera_covariance(CAMERA.of(view).value)
+        names = [m.landmarks[m.landmark_of[line]] for line in pairs.pairs[:, 0]]
+        explained = explain(open_rivals(SeenLines(
+            pairs.lines_world, pairs.segments_px, names, fix.world_from_robot, robot.camera, robot.mount,
+            np.array(fix.camera_step or (0.0,) * len(known)), known)))
         if not is_worth_telling(view, ABOUT, explained):
             return None
         segments, there = view.get(pairs.segments), fix.world_from_robot
@@ -56,12 +57,3 @@ class LensMonitor(RobotKnowledgeSource):
 
     def act(self, view: View, case: Post) -> Iterable[Effect]:
         yield case
-
-
-@lru_cache(maxsize=2)  # asked when it is triggered, when it is chosen and when it acts
-def _explain(fix: PoseFix, pairs: LineMatch, names: tuple[str, ...], camera: Camera, mount: CameraMount,
-             state: CameraState) -> tuple[Explanation, ...]:
-    known = compute_camera_covariance(state)
-    return explain(open_rivals(SeenLines(
-        pairs.lines_world, pairs.segments_px, names, fix.world_from_robot, camera, mount,
-        np.array(fix.camera_step or (0.0,) * len(known)), known)))

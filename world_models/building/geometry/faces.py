@@ -127,7 +127,7 @@ def area_vector(polygon_world: NDArray[np.float64]) -> NDArray[np.float64]:
 def area_vectors(polygons_world: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """(m, 3) :func:`area_vector` of each polygon (k, 3): of all with as many corners at once."""
     corners, found = np.array([len(polygon) for polygon in polygons_world]), np.empty((len(polygons_world), 3))
-    for count in set(corners.tolist()):
+    for count in sorted(set(corners.tolist())):
         of = np.flatnonzero(corners == count)
         found[of] = area_vector(np.array([polygons_world[i] for i in of.tolist()]))
     return found
