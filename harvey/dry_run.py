@@ -28,7 +28,7 @@ from blackboard import (
     View,
     Watch,
 )
-from harvey.runner.world_port import build_scheduler
+from harvey.runner.ports import build_scheduler
 from harvey.wiring import knowledge_sources
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX

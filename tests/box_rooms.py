@@ -1,13 +1,16 @@
-"""Small places for tests: a furnished room as faces, and houses of a few rooms as world files."""
+"""Small places for tests: a furnished room as faces, and houses of a few rooms as world files; and what bars ways."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from experiments.generated.scenes import Patch, PatchFace
+from world_models.building.world import World
 
 
 def box_faces(low: Any, high: Any, name: str, *, inside: bool = False, **appearance: Any) -> tuple[PatchFace, ...]:
@@ -74,3 +77,12 @@ def generate_house(rng: np.random.Generator) -> str:
                          f" along = {rng.uniform(0.8, 2.6):.3f}, open = true }}")
         at += width + rng.uniform(0.1, 0.4)
     return "\n".join([*text, "[doors]", *doors])
+
+
+def barriers(world: World, rooms: Sequence[str]) -> shapely.Geometry:
+    """The floor lines of the walls of rooms, with the doorways taken out, and the footprints of what stands there."""
+    outlines = shapely.union_all([shapely.LinearRing(world.outline(room)) for room in rooms])
+    openings = [shapely.Polygon(np.concatenate([*d.thresholds_world])).convex_hull.buffer(1e-6)
+                for room in rooms for d in world.doorways_of(room)]
+    things = [shapely.Polygon(f) for room in rooms for f in world.obstacles(room)]
+    return shapely.union_all([outlines.difference(shapely.union_all(openings)), *things])

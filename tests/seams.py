@@ -23,6 +23,16 @@ from world_models.camera import Camera, CameraMount
 from world_models.frames import Pose2
 
 
+def install(folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, module: str, entry_points: str) -> None:
+    """A package of one module, as pip leaves it: the module, and its metadata beside it."""
+    (folder / f"{name}.py").write_text(module, encoding="utf-8")
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n", encoding="utf-8")
+    (info / "entry_points.txt").write_text(entry_points, encoding="utf-8")
+    monkeypatch.syspath_prepend(folder)
+
+
 def check_command(command: CliCommand, of: str = "") -> None:
     """A command, or a verb of the command ``of``: it says what it is for, and its examples are parsed."""
     words = ["harvey", *of.split(), command.name]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from blackboard import Change, Effect, Entry, KnowledgeSource, Post, Revise, Scheduler
-from harvey.runner.world_port import WorldPort
+from harvey.runner.ports import WorldPort
 from harvey.simulation.simulated_run import build_robot_model
 from harvey.testing import Bench
 from knowledge_sources.methods.belief import weigh_rivals

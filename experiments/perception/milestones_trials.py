@@ -10,7 +10,7 @@ import numpy as np
 
 from blackboard import Effect, Post, View
 from experiments.perception.milestones_cases import MIN_DIFFERENCE, Case, Site, generate_cases, get_site
-from harvey.runner.world_port import build_scheduler
+from harvey.runner.ports import build_scheduler
 from knowledge_sources.methods.verification import Weighed
 from knowledge_sources.milestone.line_finder import LineFinder
 from knowledge_sources.milestone.matcher import Matcher

@@ -22,9 +22,8 @@ from blackboard import Blackboard, Level, Post, Scheduler
 from experiments.generated.floors import Floor, generated_floor
 from experiments.report import Cell, Claim, Report
 from experiments.trials import RESULTS, campaign_folder, judge_rare, judge_share, run_trials
-from harvey.runner.ports import BodyPort
+from harvey.runner.ports import BodyPort, build_scheduler
 from harvey.runner.run import run_to_outcome
-from harvey.runner.world_port import build_scheduler
 from knowledge_sources.action.dead_reckoner import DeadReckoner
 from knowledge_sources.goal.goal_renewer import goal_renewer
 from knowledge_sources.goal.mission_monitor import mission_monitor

@@ -15,8 +15,8 @@ from harvey.errors import BadInput
 from world_models.plugins import COMMANDS_GROUP, list_absent, list_plugins, load_plugins
 
 MODULES: Mapping[str, str] = {
-    "demo": "demo", "list": "listing", "run": "run_command", "view": "view", "story": "explain", "why": "explain",
-    "replay": "again",
+    "demo": "run_command", "list": "listing", "run": "run_command", "view": "view",
+    "story": "explain", "why": "explain", "replay": "again",
     "diff": "explain", "report": "report", "export": "report", "resume": "again", "repair": "again",
     "world": "world_command", "settings": "listing", "experiment": "listing", "campaign": "run_command",
     "drive": "drive", "tell": "drive", "emulate": "emulate", "completion": "listing",

@@ -20,10 +20,6 @@ from harvey.errors import BadInput
 if TYPE_CHECKING:
     from knowledge_sources.settings import Row
 
-def _add_list_arguments(_parser: ArgumentParser) -> None:
-    pass
-
-
 def _run_list(_args: Namespace) -> int:
     import experiments
     from sim.scenario_names import describe_scenario, find_scenarios
@@ -46,7 +42,7 @@ def _item(name: str, text: str) -> str:
 
 LIST = CliCommand(
     "list", "what there is to run: scenarios and experiments",
-    (("harvey list", "names and descriptions"),), _add_list_arguments, _run_list,
+    (("harvey list", "names and descriptions"),), lambda _parser: None, _run_list,
 )
 
 

@@ -1,9 +1,10 @@
-"""``harvey run`` and ``campaign``: missions in the simulator, one or many, and how many of them went."""
+"""``harvey run``, ``demo`` and ``campaign``: missions in the simulator: one, one to show, or many."""
 
 from __future__ import annotations
 
 import os
 import sys
+import webbrowser
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from harvey.campaign.workers import choose_workers, count_processors, find_cluster
 from harvey.commands.command import CliCommand, add_worker_arguments, parse_pairs, parse_seeds, parse_workers, whole
 from harvey.errors import BadInput, Terminated
-from logs.run_directory import RUNS, check_vacant
+from logs.run_directory import RUNS, RunDirectory, check_vacant
 
 if TYPE_CHECKING:
     from harvey.campaign.mission_task import Keep, Task
@@ -288,4 +289,45 @@ CAMPAIGN = CliCommand(
     _add_campaign_arguments, _run_campaign,
     "A campaign is what harvey run with several seeds, or harvey experiment, makes: its directory has results.jsonl.\n"
     "Exit code 0: done; 1: compare finds the second worse, beyond chance; 2: the input cannot be used.",
+)
+
+
+SHOWN = "hallway-kidnap"
+FIRST_WORDS = """\
+The robot drives to an office that it knows from a model only. In the hallway somebody moves it by a metre and
+turns it by 20 degrees. Nobody tells it. See it refute what it believed, be lost, look round, and know where it is."""
+
+
+def _add_demo_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("--out", metavar="DIR", help="directory for the run's files and the page (runs/demo)")
+    parser.add_argument("--no-page", action="store_true", help="write the page, but do not open it")
+
+
+def _run_demo(args: Namespace) -> int:
+    from harvey.campaign.mission_task import Task, run_task
+    from harvey.commands.report import build_run_page, write_page
+    from logs.explain.story import first_lines
+
+    out = check_vacant(Path(args.out or RUNS / "demo"))
+    task = Task(SHOWN, (), 0, out)
+    task.load()
+    print(f"{FIRST_WORDS}\n", flush=True)
+    result = run_task(task, progress=sys.stderr)
+    page = out / "report.html"
+    write_page(page, build_run_page(RunDirectory(out)))
+    print("", *first_lines(out), "", f"{page}: the whole run; opens in any browser", "", sep="\n")
+    print(f"ask it      harvey why {out} 'when was it lost?'\nlook at it  harvey view {out}\n"
+          "then        harvey run lab-to-allens-office")
+    if not args.no_page:
+        webbrowser.open(page.resolve().as_uri())
+    return 0 if result.outcome == "reached" else 1
+
+
+DEMO = CliCommand(
+    "demo", "see it kidnapped, lost and found, in a minute; a page opens at the end",
+    (
+        ("harvey demo", "drive, tell what happened, and open the page"),
+        ("harvey demo --no-page", "without opening it, as on a machine without a screen"),
+    ),
+    _add_demo_arguments, _run_demo,
 )

@@ -195,33 +195,25 @@ def _downward(world: World, name: str) -> Iterator[str]:
 def _draw(world: World, out: Path) -> None:
     from logs.run_errors import RecordingError
 
-    draw = {".svg": _svg, ".png": _png, ".rrd": _recording}.get(out.suffix)
-    if draw is None:
-        raise BadInput(f"--out: expected a name that ends in .svg, .png or .rrd, got {str(out)!r}")
     try:
-        draw(world, out)
+        if out.suffix == ".svg":
+            from world_models.building.plan_view import plan_svg
+
+            out.write_text(plan_svg(world), encoding="utf-8")
+        elif out.suffix == ".png":
+            from harvey.commands.plan_picture import draw_plan
+
+            draw_plan(world, out)
+        elif out.suffix == ".rrd":
+            from logs.recording.loggers.surroundings.model_building import record_building
+
+            record_building(world, out)
+        else:
+            raise BadInput(f"--out: expected a name that ends in .svg, .png or .rrd, got {str(out)!r}")
     except RecordingError as error:
         raise BadInput(f"--out {out}: {error}") from None
     except OSError as error:
         raise BadInput(f"--out {out}: expected a file to write to, got: {error.strerror}") from None
-
-
-def _svg(world: World, out: Path) -> None:
-    from world_models.building.plan_view import plan_svg
-
-    out.write_text(plan_svg(world), encoding="utf-8")
-
-
-def _png(world: World, out: Path) -> None:
-    from harvey.commands.plan_picture import draw_plan
-
-    draw_plan(world, out)
-
-
-def _recording(world: World, out: Path) -> None:
-    from logs.recording.loggers.surroundings.model_building import record_building
-
-    record_building(world, out)
 
 
 VERBS = (

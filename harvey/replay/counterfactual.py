@@ -16,13 +16,12 @@ from typing import Any
 from blackboard import Change, Decision, Post, Scheduler, View, decision_record, plain
 from harvey.agent import Agent, build_agent
 from harvey.replay.what_if import check_segments
-from harvey.runner.ports import BodyPort
+from harvey.runner.ports import BodyPort, WorldPort, tell_robot
 from harvey.runner.replay import Live, ignore, open_originals
 from harvey.runner.result import UNFINISHED, MissionResult, format_error
 from harvey.runner.resume import RESUME
 from harvey.runner.run import Over, run_to_outcome
 from harvey.runner.teller import PAGE, SOMEBODY, USER
-from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.simulated_run import SimulatedRun, rebuild_stage
 from logs.explain.phrases import sentence
 from logs.records import WHAT_IF, DecisionRecord, EntryRecord, Originals, as_line, decision_of, effect_of

@@ -13,10 +13,9 @@ from typing import Protocol
 from blackboard import RAISED, Decision, Post, Quiescence, Scheduler, Sink
 from harvey.agent import Agent
 from harvey.errors import BadInput
-from harvey.runner.ports import Body, BodyPort
+from harvey.runner.ports import Body, BodyPort, WorldPort, tell_robot
 from harvey.runner.result import UNFINISHED, MissionResult, RunCounts, tell_refusal
 from harvey.runner.teller import FileTeller, Tell, Teller, tell_each, tell_nothing
-from harvey.runner.world_port import WorldPort, tell_robot
 from logs.disk import CannotWriteError
 from logs.run_directory import RunDirectory
 from logs.run_errors import RecordingError

@@ -18,13 +18,13 @@ from sim.body.wheel_errors import (
     ContinuousMotion,
     SimulatedWheels,
     Slip,
-    arc_displacement,
     arc_steps,
 )
 from sim.faults.fault import DeviceFault, Fault, FaultSchedule
 from sim.render.lighting import Lighting
 from sim.render.sensor import Occluder, SensorParameters
 from sim.truth import Truth
+from world_models.actuator import arc
 from world_models.camera import Camera, CameraMount
 from world_models.entries import (
     BodyFault,
@@ -230,7 +230,7 @@ class SimulatedBody:
         slip = self._slip = self._slip or self._wheels.sample_slip(self._wheel_rng)
         before = self._truth.world_from_robot
         there = before @ Pose2(*self._wheels.sample_skitter(turn_rad, self._wheel_rng), turn_rad * slip.turn_factor)
-        there = there @ arc_displacement(move_m * slip.length_factor, slip.curvature_per_m)
+        there = there @ arc(move_m * slip.length_factor, slip.curvature_per_m)
         if self._building.obstacles.blocks(before, there):
             if self._touching_rad is None:
                 self._touching_rad = self._count_collision(there, duration_s)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from world_models.actuator import arc
 from world_models.frames import Pose2
 from world_models.units import Bounded, bounded
 
@@ -154,15 +155,7 @@ def arc_steps(length_m: float, curvature_per_m: float) -> Iterator[Pose2]:
     """An arc as equal displacements of at most ``STEP_M``, each in the frame at the end of the one before."""
     count = math.ceil(abs(length_m) / STEP_M)
     for _ in range(count):
-        yield arc_displacement(length_m / count, curvature_per_m)
-
-
-def arc_displacement(length_m: float, curvature_per_m: float) -> Pose2:
-    """The displacement along an arc that is tangent to x at its start; positive curvature bends to the left."""
-    turn = length_m * curvature_per_m
-    if abs(turn) < 1e-9:
-        return Pose2(length_m, 0.5 * length_m * turn, turn)
-    return Pose2(math.sin(turn) / curvature_per_m, (1.0 - math.cos(turn)) / curvature_per_m, turn)
+        yield arc(length_m / count, curvature_per_m)
 
 
 def _round_to(value: float, step: float) -> float:
@@ -208,7 +201,7 @@ class ContinuousMotion:
         """The displacement after a while at the present speed (before now, where negative), in the robot's frame."""
         slip = self.slip or Slip(1.0, 1.0, 0.0)
         curvature = slip.curvature_per_m + self.curvature_per_m * slip.turn_factor
-        return arc_displacement(self.speed_m_per_s * duration_s * slip.length_factor, curvature)
+        return arc(self.speed_m_per_s * duration_s * slip.length_factor, curvature)
 
     def advance(self, duration_s: float, acceleration_m_per_s2: float) -> tuple[Pose2, ContinuousMotion]:
         """One short step: the displacement in the robot's frame, and the motion after it."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.faults.fault import DURATION, DeviceFault, Fault, FaultTarget
+from sim.faults.fault import DURATION, DeviceFault, Fault, FaultTarget, PassingFault
 from sim.render.sensor import Occluder
 from world_models.entries import Place
 from world_models.frames import Pose2
@@ -17,17 +17,10 @@ from world_models.units import Bounds
 
 
 @dataclass(frozen=True, slots=True)
-class LightsOff(Fault):
-    """The building's lights go off.
-
-    Attributes:
-        duration_s: for how long [s].
-    """
+class LightsOff(PassingFault):
+    """The building's lights go off."""
 
     kind: ClassVar[str] = "lights_off"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
-
-    duration_s: float = 10.0
 
     @property
     def words(self) -> str:
@@ -38,18 +31,16 @@ class LightsOff(Fault):
 
 
 @dataclass(frozen=True, slots=True)
-class Occlusion(Fault):
+class Occlusion(PassingFault):
     """A rectangle of the picture is hidden. Where it is, and how dark, is drawn at random.
 
     Attributes:
-        duration_s: for how long [s].
         part: of the picture's area, 0..1.
     """
 
     kind: ClassVar[str] = "occluded"
     bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION, "part": Bounds(0.0, 0.99, above=True)}
 
-    duration_s: float = 10.0
     part: float = 0.2
 
     @property
@@ -263,17 +254,10 @@ class DroppedFrames(DeviceFault):
 
 
 @dataclass(frozen=True, slots=True)
-class CameraFrozen(Fault):
-    """The camera delivers its last picture again and again, as if it were new.
-
-    Attributes:
-        duration_s: for how long [s].
-    """
+class CameraFrozen(PassingFault):
+    """The camera delivers its last picture again and again, as if it were new."""
 
     kind: ClassVar[str] = "camera_frozen"
-    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
-
-    duration_s: float = 10.0
 
     @property
     def words(self) -> str:

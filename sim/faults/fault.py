@@ -121,7 +121,20 @@ class Fault(ABC):
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceFault(Fault):
+class PassingFault(Fault):
+    """A fault that is over after a while.
+
+    Attributes:
+        duration_s: for how long it lasts [s].
+    """
+
+    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
+
+    duration_s: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFault(PassingFault):
     """A device does not work for a while; every request to it is answered by a ``BodyFault`` with these words.
 
     Attributes:
@@ -129,7 +142,6 @@ class DeviceFault(Fault):
         what: the fault in the words of the hardware drivers; detail: the same in a sentence's words.
         stops_motion_after_s: a motion is broken off this long after the fault began [s]; None: it is completed.
         odometry_arrives: whether the encoders' counts are still read while it lasts.
-        duration_s: for how long it lasts [s].
     """
 
     part: ClassVar[str]
@@ -137,9 +149,6 @@ class DeviceFault(Fault):
     detail: ClassVar[str]
     stops_motion_after_s: ClassVar[float | None] = None
     odometry_arrives: ClassVar[bool] = True
-    bounds: ClassVar[Mapping[str, Bounds]] = {"duration_s": DURATION}
-
-    duration_s: float = 10.0
 
     @property
     def words(self) -> str:

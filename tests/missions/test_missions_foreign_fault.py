@@ -8,6 +8,7 @@ import pytest
 
 from experiments.generated.missions import OFFICE, fault
 from harvey.simulation.simulated_run import run_mission
+from seams import install
 from sim.faults.fault_registry import list_fault_kinds
 from sim.scenario import Scenario, ScenarioError, parse_scenario, scenario_from_tables
 from sim.stage import build_stage
@@ -72,13 +73,7 @@ QUAKE = fault("earthquake", "allens-office", 1.5, swing_deg=3.0)
 
 @pytest.fixture(autouse=True)
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As pip leaves a package: its module, and its metadata beside it."""
-    (tmp_path / "tremors.py").write_text(MODULE)
-    metadata = tmp_path / "tremors-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: tremors\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(ENTRY_POINTS)
-    monkeypatch.syspath_prepend(tmp_path)
+    install(tmp_path, monkeypatch, "tremors", MODULE, ENTRY_POINTS)
 
 
 def jumps_of(scenario: Scenario) -> tuple[list[float], tuple[str, ...]]:

@@ -12,9 +12,9 @@ import pytest
 from blackboard import Decision, KnowledgeSource, Post
 from harvey.agent import build_agent
 from harvey.cli import main
+from harvey.runner.ports import WorldPort, tell_robot
 from harvey.runner.result import MissionResult
 from harvey.runner.teller import USER
-from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.simulation.simulated_run import build_head, run_mission
 from harvey.wiring import knowledge_sources
 from knowledge_sources.settings import Settings

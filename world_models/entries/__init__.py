@@ -3,12 +3,12 @@
 ``locale_frame``: what is known of the building, one locale at a time, and the requests that bring it.
 ``robot_state``: what the robot knows of its camera, wheels and footprint, and what of the camera was believed
 wrongly. ``body``: requests to the robot's body and its answers. ``task``: command, goal, plan sketch, leg, milestone,
-certificate, outcome. ``percepts``: tracks, segments, matches, pose fixes. ``user_reports``: what somebody says on the
-way. ``location``: pose hypotheses, and the way since a known place. ``protection_level``: how far off a pose may be at
-a stated risk. ``obstacle``: contacts and ranges, what stands in the way, occlusions of the lens. ``floor``: free
-floor, and what floors look like. ``door_state``: which doors are seen open or shut. ``difference``: what is not as
-expected, and the rivals that would explain it. ``discrepancy``: how far off, and the ladder of levels that correct it.
-``entry_kinds``: all of them; not part of this face, as frames stand with the building.
+certificate, outcome, and what somebody says on the way. ``percepts``: tracks, segments, matches, pose fixes.
+``location``: pose hypotheses, how far off a pose may be at a stated risk, and the way since a known place.
+``obstacle``: contacts and ranges, what stands in the way, occlusions of the lens. ``floor``: free floor, and what
+floors look like. ``door_state``: which doors are seen open or shut. ``difference``: what is not as expected, and the
+rivals that would explain it. ``discrepancy``: how far off, and the ladder of levels that correct it. ``entry_kinds``:
+all of them; not part of this face, as frames stand with the building.
 """
 
 from world_models.entries.body import (
@@ -22,23 +22,19 @@ from world_models.entries.floor import (
     FloorAppearance, FloorEnd, FloorThing, FloorView, FreeFloor, LAST_VIEWS, Light, Point,
 )
 from world_models.entries.location import (
-    Hypothesis, LocalePoses, Place, PlaceOdds, PlaceSearch, Travel, Alias, AliasOdds, begin_travel, covariance_tuple,
-    diagonal, turn_about_camera,
+    ALERT_LIMIT_M, Hypothesis, LocalePoses, Place, PlaceOdds, PlaceSearch, Protection, RISK, SHARED_SIGMA_M, Travel,
+    Alias, AliasOdds, begin_travel, count_sigmas, covariance_tuple, diagonal, turn_about_camera,
 )
 from world_models.entries.obstacle import (
     AROUND_SIGMA_RAD, Contact, Corners, Obstacle, ObstacleStatus, Ranges, Sense,
 )
 from world_models.entries.percepts import Anchor, Glimpse, LineMatch, Panorama, PoseFix, Segments, Track, Tracks
-from world_models.entries.protection_level import (
-    ALERT_LIMIT_M, Protection, RISK, SHARED_SIGMA_M, count_sigmas,
-)
 from world_models.entries.robot_state import CameraLesson, CameraState, Drift, Footprint, Wheels, find_camera_lessons
 from world_models.entries.task import (
-    Certificate, Command, Goal, Impasse, Leg, Milestone, MilestoneVerdict, Outcome, PlanSketch, Resumed, SketchStatus,
-    Subgoal,
+    Certificate, Command, DOOR_STATES, GO_ON, Goal, Impasse, Leg, Milestone, MilestoneVerdict, Outcome, PlanSketch,
+    Redirection, Resumed, SketchStatus, Subgoal, UserReport,
 )
 from world_models.obstruction import Obstruction
-from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, UserReport
 
 __all__ = [
     "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LADDER", "LAST_REPORTS", "LAST_VIEWS", "MISLEADING",

@@ -14,9 +14,8 @@ from world_models.entries import (
     percepts,
     robot_state,
     task,
-    user_reports,
 )
 
 KINDS = kinds_in(
-    locale_frame, user_reports, robot_state, body, task, percepts, location, obstacle, obstruction, floor, door_state,
+    locale_frame, robot_state, body, task, percepts, location, obstacle, obstruction, floor, door_state,
     difference, discrepancy)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from blackboard import Entry, Level, View, inference
 from world_models import words
 from world_models.entries.discrepancy import OPEN
-from world_models.entries.location import Covariance
-from world_models.entries.protection_level import UNPROTECTED, Protection
+from world_models.entries.location import UNPROTECTED, Covariance, Protection
 from world_models.frames import Pose2
 
 LAST_SEGMENTS = 8

@@ -1,4 +1,5 @@
-"""The task model (§3.3): commands, goals in conceptual-dependency form, plan sketches, milestones and how it ended."""
+"""The task model (§3.3): commands, and what somebody says on the way; goals in conceptual-dependency form, plan
+sketches, milestones and how it ended."""
 
 from __future__ import annotations
 
@@ -403,3 +404,53 @@ class Resumed:
         heard = "".join(f"; how far {ref} was carried out is not known" for ref in self.interrupted)
         where = f"the run was cut off after cycle {self.after_cycle} and goes on"
         return f"{where}; the robot was stopped in between{heard}"
+
+
+ReportedState = Literal["shut", "open", "gone", "there"]
+DOOR_STATES: tuple[ReportedState, ...] = ("shut", "open")
+
+
+@observation()
+@dataclass(frozen=True, slots=True)
+class UserReport:
+    """Somebody says how a door or a thing of the building is.
+
+    Attributes:
+        what: name of the door or thing, as ``library-door`` or ``allens-office/desk``.
+        state: shut or open (a door), gone or there (a thing).
+        answer: what became of it, in words; "" until it was taken up.
+    """
+
+    what: str
+    state: ReportedState
+    answer: str = ""
+
+    def sentence(self) -> str:
+        return f"was told that {self.what} is {self.state}" + f"; {self.answer}" * bool(self.answer)
+
+
+GO_ON = "go on"
+"""What somebody says who asks for no other goal, but lets the robot start again after a stop."""
+
+
+@observation()
+@dataclass(frozen=True, slots=True)
+class Redirection:
+    """Somebody asks the robot, on its way, to go elsewhere, or after a stop to go on.
+
+    Attributes:
+        text: where to: "Go to the library", "library", ``(library (6,10,0))``, feet in the locale's frame; or "go on".
+        by: who asks: "user" where the mission's file says so, "live page" while the run goes on.
+        answer: what became of it, in words; "" until it was taken up.
+    """
+
+    text: str
+    by: str = "user"
+    answer: str = ""
+
+    @property
+    def asked(self) -> str:
+        return f"to {GO_ON}" if self.text == GO_ON else f"to go elsewhere: {self.text}"
+
+    def sentence(self) -> str:
+        return f"was asked {self.asked}" + f"; {self.answer}" * bool(self.answer)

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ifc_house import House, box
 from numpy.typing import NDArray
 
 from harvey_buildings import read_plan
 from harvey_buildings.building_plan import BuildingPlan
-from ifc_house import House, box
 
 pytestmark = pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell")
 

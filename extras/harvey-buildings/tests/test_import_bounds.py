@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from ifc_house import House, box
 
 from harvey_buildings import BuildingError, read_plan
 from harvey_buildings.building_plan import BuildingPlan, Names, RoomLink, Space, Storey, slug
@@ -18,7 +19,6 @@ from harvey_buildings.ifc_file import build_column, build_stairs, find_climbed_s
 from harvey_buildings.indoor_gml import _find_crossing, _Reader, read_indoor_gml
 from harvey_buildings.indoor_gml_file import find_origin, read_xml
 from harvey_buildings.layout import Layout, lay_out
-from tests.ifc_house import House, box
 
 needs_ifc = pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell")
 NAMES = {"c": "http://www.opengis.net/indoorgml/1.0/core", "g": "http://www.opengis.net/gml/3.2",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ifc_house import House, flat
 
 from harvey.cli import main
 from harvey_buildings import BuildingError
@@ -17,7 +18,6 @@ from harvey_buildings.ifc import read_ifc
 from harvey_buildings.layout import lay_out
 from harvey_buildings.ros_map import read_ros_map
 from harvey_buildings.world_text import world_text
-from ifc_house import House, flat
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from blackboard import Decision, Effect, Post, Revise, Scheduler
 from harvey.agent import Agent, build_agent
 from harvey.errors import BadInput
-from harvey.runner.ports import STANDS_STILL, StillCamera
+from harvey.runner.ports import STANDS_STILL, StillCamera, WorldPort, tell_robot
 from harvey.runner.result import Refusals
-from harvey.runner.world_port import WorldPort, tell_robot
 from harvey.wiring import KNOWLEDGE_SOURCES
 from harvey_ros2.picture_lag import PictureLag
 from harvey_ros2.run_messages import KINDS, RunMessages, TimedMessage

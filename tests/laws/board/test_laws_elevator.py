@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Decision, Post, Quiescence
+from box_rooms import barriers
 from harvey.dry_run import build_dry_run
 from towers import tower
 from world_models.actuator import ActuatorModel
@@ -55,23 +56,14 @@ def drive(world: World, origin: str, destination: str) -> tuple[list[object], Ou
     return made, outcome.value if outcome else Outcome("failed", "no end")
 
 
-def solid_on(world: World, floor_m: float) -> shapely.Geometry:
-    """The floor lines of the walls of a floor, with its doorways taken out, and what stands in the way there."""
-    rooms = [room for room in world.rooms if abs(world.floor_m(room) - floor_m) < 0.1]
-    outlines = shapely.union_all([shapely.LinearRing(world.outline(room)) for room in rooms])
-    openings = [shapely.Polygon(np.concatenate([*d.thresholds_world])).convex_hull.buffer(1e-6)
-                for room in rooms for d in world.doorways_of(room)]
-    things = [shapely.Polygon(f) for room in rooms for f in world.obstacles(room)]
-    return shapely.union_all([outlines.difference(shapely.union_all(openings)), *things])
-
-
 def check_subgoal(world: World, subgoal: Subgoal) -> None:
     ends = [subgoal.origin.locale, subgoal.destination.locale]
     floors = [world.floor_m(name) for name in ends]
     if subgoal.primitive:
         assert abs(floors[0] - floors[1]) < 1e-9, f"{subgoal} is driven from floor to floor"
         line = shapely.LineString([p.in_world(world).position for p in (subgoal.origin, subgoal.destination)])
-        assert not line.intersects(solid_on(world, floors[0])), f"{subgoal} passes a barrier"
+        rooms = [room for room in world.rooms if abs(world.floor_m(room) - floors[0]) < 0.1]
+        assert not line.intersects(barriers(world, rooms)), f"{subgoal} passes a barrier"
     elif subgoal.passage:
         assert world.common(*ends) == "elevator" and all(world.locale(name).kind == "landing" for name in ends)
 

@@ -28,8 +28,7 @@ from blackboard import (
     request,
 )
 from blackboard.kinds import Kind, NotAKindError, is_kind
-from harvey.runner.ports import BodyPort
-from harvey.runner.world_port import WorldPort
+from harvey.runner.ports import BodyPort, WorldPort
 from harvey.wiring import knowledge_sources
 from journals import read_journal
 from logs import disk

@@ -31,7 +31,7 @@ from blackboard import (
     View,
     Watch,
 )
-from harvey.runner.world_port import build_scheduler
+from harvey.runner.ports import build_scheduler
 from harvey.simulation.simulated_run import build_robot_model
 from harvey.wiring import KNOWLEDGE_SOURCES
 from knowledge_sources.goal.discrepancy_raiser import MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION

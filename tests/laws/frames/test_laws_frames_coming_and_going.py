@@ -29,8 +29,8 @@ from blackboard import (
 from blackboard.kinds import Kind
 from experiments.generated.missions import HALLWAY
 from harvey.agent import build_agent
+from harvey.runner.ports import WorldPort
 from harvey.runner.replay import open_originals
-from harvey.runner.world_port import WorldPort
 from harvey.simulation.simulated_run import run_mission
 from harvey.wiring import load_kinds
 from knowledge_sources.model.model_reviser import ModelReviser

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from blackboard import RAISED, Post, Scheduler, View
 from harvey.agent import build_agent
 from harvey.replay.what_if import WhatIf
-from harvey.runner.world_port import tell_robot
+from harvey.runner.ports import tell_robot
 from harvey.simulation.simulated_run import SimulatedRun, build_head
 from logs.run_recorder import RunRecorder
 from sim.stage import Stage

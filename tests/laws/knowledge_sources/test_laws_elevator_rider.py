@@ -7,6 +7,7 @@ from dataclasses import replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from blackboard import Entry
 from generated_boards import Bench, all_reasons, effect_on
 from harvey.testing import check_source
 from knowledge_sources.action.elevator_rider import elevator_rider
@@ -19,6 +20,12 @@ THROUGH = replace(WALK, passage="door")
 ACROSS = Subgoal(Place("hall", 0.0, 0.0), BELOW, primitive=False)
 
 
+def on_the_way(*rides: Subgoal, index: int) -> tuple[Bench, Entry[PlanSketch]]:
+    """A board with a sketch of rides, of which so many are over."""
+    bench = Bench()
+    bench.believe()
+    goal = bench.pursue(FAR)
+    return bench, bench.put(PlanSketch(goal.id, (), "", rides, index, True), goal)
 
 
 @settings(max_examples=60)
@@ -41,26 +48,17 @@ def test_it_asks_for_the_next_subgoal_where_that_is_a_ride_and_was_not_asked_for
 
 
 def test_at_the_end_of_a_sketch_there_is_no_ride() -> None:
-    bench = Bench()
-    bench.believe()
-    goal = bench.pursue(FAR)
-    sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 1, True), goal)
+    bench, sketch = on_the_way(UP, index=1)
     assert bench.ask(elevator_rider, sketch) is None
 
 
 def test_the_second_ride_is_from_where_the_first_one_ended() -> None:
-    bench = Bench()
-    bench.believe()
-    goal = bench.pursue(FAR)
-    sketch = bench.put(PlanSketch(goal.id, (), "", (UP, ON), 1, True), goal)
+    bench, sketch = on_the_way(UP, ON, index=1)
     bench.put(Ride(sketch.id, 0, "lift", "car-1", "car-2"))
     ride = effect_on(bench.ask(elevator_rider, sketch), Ride).value
     assert (ride.index, ride.origin, ride.destination) == (1, "car-2", "car-3")
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:
-    bench = Bench()
-    bench.believe()
-    goal = bench.pursue(FAR)
-    sketch = bench.put(PlanSketch(goal.id, (), "", (UP,), 0, True), goal)
-    check_source(elevator_rider, bench, sketch, without=(goal.id,))
+    bench, sketch = on_the_way(UP, index=0)
+    check_source(elevator_rider, bench, sketch, without=(sketch.value.goal,))

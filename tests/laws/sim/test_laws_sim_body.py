@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from box_rooms import box_room
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
-from sim.body.wheel_errors import ActuatorParameters, arc_displacement, arc_steps
+from sim.body.wheel_errors import ActuatorParameters, arc_steps
+from world_models.actuator import arc
 from world_models.camera import Camera, CameraMount
 from world_models.entries import MotorCommand
 from world_models.frames import Pose2
@@ -74,7 +75,7 @@ def test_the_steps_of_an_arc_make_the_arc(length_m: float, curvature_per_m: floa
     end = Pose2(0.0, 0.0, 0.0)
     for step in arc_steps(length_m, curvature_per_m):
         end = end @ step
-    whole = arc_displacement(length_m, curvature_per_m)
+    whole = arc(length_m, curvature_per_m)
     assert np.allclose([end.x_m, end.y_m, end.heading_rad], [whole.x_m, whole.y_m, whole.heading_rad], atol=1e-7)
 
 

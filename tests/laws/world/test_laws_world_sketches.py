@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blackboard import Decision, Post, Quiescence
-from box_rooms import generate_house
+from box_rooms import barriers, generate_house
 from harvey.dry_run import build_dry_run
 from world_models.actuator import ActuatorModel
 from world_models.building.world import World
@@ -44,14 +44,6 @@ def plan_sketches(world: World) -> tuple[list[PlanSketch], Outcome]:
     return sketches, outcome.value if outcome else Outcome("failed", "no end")
 
 
-def barriers(world: World) -> shapely.Geometry:
-    """The floor lines of all walls with the doorways taken out, and the footprints of what stands in the way."""
-    outlines = shapely.union_all([shapely.LinearRing(world.outline(room)) for room in world.rooms])
-    openings = [shapely.Polygon(np.concatenate([*d.thresholds_world])).convex_hull.buffer(1e-6) for d in world.doorways]
-    solid = [shapely.Polygon(f) for room in world.rooms for f in world.obstacles(room)]
-    return shapely.union_all([outlines.difference(shapely.union_all(openings)), *solid])
-
-
 def way_of(world: World, subgoal: Subgoal) -> shapely.LineString:
     ends = [place.in_world(world).position for place in (subgoal.origin, subgoal.destination)]
     return shapely.LineString(ends)
@@ -63,7 +55,7 @@ def test_sketches_keep_clear_of_barriers_and_keep_what_is_verified(seed: int) ->
     world = read_world(Source.parse(generate_house(np.random.default_rng(seed)), "house.toml"))
     sketches, outcome = plan_sketches(world)
     assert outcome.kind in ("reached", "blocked"), outcome
-    solid = barriers(world)
+    solid = barriers(world, world.rooms)
     for sketch in sketches:
         for subgoal in sketch.subgoals:
             if subgoal.primitive:

@@ -175,8 +175,6 @@ def test_a_run_that_was_cut_off_is_told_and_is_one_error(
     assert len(printed.err.splitlines()) == 1 and f"was cut off in cycle {whole}" in printed.err
 
 
-
-
 def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Path], history: Timeline) -> None:
     run = RunDirectory(told[1])
     drawn = dict(read_series(run.recording, POSITION, "Measurements:values"))

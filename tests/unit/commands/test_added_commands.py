@@ -8,7 +8,7 @@ import pytest
 
 from harvey.cli import main
 from harvey.commands import MODULES, find_added_commands, find_commands
-from seams import check_command
+from seams import check_command, install
 from world_models import plugins
 
 MODULE = '''
@@ -20,19 +20,13 @@ def say(args):
 
 HELLO = CliCommand("hello", "say hello", (("harvey hello you", "to you"),), lambda p: p.add_argument("name"), say)
 '''
-META = "Metadata-Version: 2.1\nName: harvey-hello\nVersion: 0.1\n"
 
 
 @pytest.fixture
 def hello(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An installed package with a command and a verb of ``world``."""
-    (tmp_path / "hello_module.py").write_text(MODULE, encoding="utf-8")
-    info = tmp_path / "harvey_hello-0.1.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(META, encoding="utf-8")
-    (info / "entry_points.txt").write_text(
-        "[harvey.commands]\nhello = hello_module:HELLO\nhouse.greet = hello_module:HELLO\n", encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
+    install(tmp_path, monkeypatch, "hello_module", MODULE,
+            "[harvey.commands]\nhello = hello_module:HELLO\nhouse.greet = hello_module:HELLO\n")
 
 
 def test_a_command_of_another_package_is_one_of_ours(hello: None, capsys: pytest.CaptureFixture[str]) -> None:

@@ -124,7 +124,6 @@ def test_a_journal_that_is_none_is_refused(
     assert code == 2 and err.count("\n") == 1
 
 
-
 @pytest.mark.parametrize("command", MODULES)
 def test_every_command_teaches_by_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--help"]) == 0

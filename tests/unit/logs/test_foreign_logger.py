@@ -14,6 +14,7 @@ from logs.recording.paths import TABLE
 from logs.recording.writer import RecordingWriter, logger_classes
 from logs.run_errors import RecordingError
 from scripted_mission import CAMERA, MOUNT, house, play
+from seams import install
 
 MODULE = '''
 from dataclasses import dataclass
@@ -50,20 +51,14 @@ class NoLogger:
 '''
 
 
-def install(folder: Path, monkeypatch: pytest.MonkeyPatch, entry_point: str) -> None:
-    """As pip leaves a package: its module, and its metadata beside it."""
-    (folder / "accounts.py").write_text(MODULE)
-    metadata = folder / "accounts-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: accounts\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(f"[harvey.loggers]\n{entry_point}\n")
-    monkeypatch.syspath_prepend(folder)
+def install_logger(folder: Path, monkeypatch: pytest.MonkeyPatch, entry_point: str) -> None:
+    install(folder, monkeypatch, "accounts", MODULE, f"[harvey.loggers]\n{entry_point}\n")
 
 
 def test_its_panel_is_in_the_window_and_its_data_in_the_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    install(tmp_path, monkeypatch, "changes = accounts:Changes")
+    install_logger(tmp_path, monkeypatch, "changes = accounts:Changes")
     subject = Subject("house", house(), CAMERA, MOUNT)
     window = blueprint([logger(subject) for logger in logger_classes()]).root_container
     assert "Changes a cycle" in [view.name for view in views(window)]
@@ -79,7 +74,7 @@ def test_its_panel_is_in_the_window_and_its_data_in_the_recording(
 def test_a_kind_of_another_package_shows_in_the_decisions_by_its_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    install(tmp_path, monkeypatch, "changes = accounts:Changes")
+    install_logger(tmp_path, monkeypatch, "changes = accounts:Changes")
     from accounts import BatteryRunsShort  # type: ignore[import-not-found]
 
     path = tmp_path / "recording.rrd"
@@ -95,6 +90,6 @@ def test_a_kind_of_another_package_shows_in_the_decisions_by_its_sentence(
 def test_what_is_no_logger_is_told_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, entry_point: str
 ) -> None:
-    install(tmp_path, monkeypatch, entry_point)
+    install_logger(tmp_path, monkeypatch, entry_point)
     with pytest.raises(RecordingError, match=r"accounts 1\.0: entry point harvey\.loggers, changes = accounts:"):
         logger_classes()

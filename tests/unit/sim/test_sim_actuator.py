@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from sim.body.wheel_errors import ActuatorParameters, SimulatedWheels, arc_displacement
+from sim.body.wheel_errors import ActuatorParameters, SimulatedWheels
+from world_models.actuator import arc
 from world_models.frames import Pose2
 
 INCH_M = 0.0254
@@ -19,7 +20,7 @@ def open_loop_run(seed: int, increments: int = 10) -> tuple[SimulatedWheels, Pos
     wheels = SimulatedWheels.draw(ActuatorParameters(), rng)
     pose = Pose2(0.0, 0.0, 0.0)
     for _ in range(increments):
-        pose = pose @ arc_displacement(*wheels.sample_arc(24 * INCH_M, rng))
+        pose = pose @ arc(*wheels.sample_arc(24 * INCH_M, rng))
     return wheels, pose
 
 
@@ -64,9 +65,9 @@ def test_the_encoders_claim_what_was_commanded_to_their_resolution() -> None:
 
 
 def test_an_arc_is_tangent_to_the_robot_at_its_start() -> None:
-    short = arc_displacement(0.01, 0.2)
+    short = arc(0.01, 0.2)
     assert abs(short.y_m / short.x_m) < 0.0011
-    assert arc_displacement(1.0, 0.2).heading_rad == pytest.approx(0.2)
+    assert arc(1.0, 0.2).heading_rad == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize("bad", [{"turn_sigma_rad": -1.0}, {"shortfall_low": 0.5}, {"speed_m_per_s": 0.0},

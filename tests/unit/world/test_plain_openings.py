@@ -72,7 +72,6 @@ def test_a_frame_of_an_unknown_finish_is_refused() -> None:
         build('frame = "nothing"')
 
 
-
 PLAN = WORLD.replace("[0.6, 0.6, 0.6]", '"unknown"')
 UNKNOWN = "\n".join(f'{key} = "grey"' for key in ("walls", "floor", "ceiling", "threshold"))
 

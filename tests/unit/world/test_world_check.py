@@ -207,18 +207,15 @@ def test_outdoors_has_no_ceiling_and_a_skyline() -> None:
     assert {1.0, 2.0, 2.7} <= tops
 
 
-def test_a_board_across_a_doorway_is_a_fault() -> None:
-    more = ('things = [ ["chest", "east", 2.4] ]\n[locales.den]\nkind = "room"\nat = [9.2, 0]\nsize = [3, 5]\n'
+@pytest.mark.parametrize(("things", "at", "told"), [
+    ('things = [ ["chest", "east", 2.4] ]\n', "[9.2, 0]",
+     "10: hall/chest-1: expected the doorway d free, got it in there"),
+    ("", "[9.2, 0, 0.2]", "15: d: expected hall and den on one level, got a step of 0.20 m"),
+])
+def test_a_board_across_a_doorway_and_a_step_in_it_are_faults(things: str, at: str, told: str) -> None:
+    more = (f'{things}[locales.den]\nkind = "room"\nat = {at}\nsize = [3, 5]\n'
             '[doors]\nd = { between = ["hall", "den"], wall = "east", along = 2, open = true }\n')
-    assert [str(f) for f in check_world(house(more))] == [
-        "house.toml:10: hall/chest-1: expected the doorway d free, got it in there"]
-
-
-def test_a_step_in_a_doorway_is_a_fault() -> None:
-    more = ('[locales.den]\nkind = "room"\nat = [9.2, 0, 0.2]\nsize = [3, 5]\n'
-            '[doors]\nd = { between = ["hall", "den"], wall = "east", along = 2, open = true }\n')
-    assert [str(f) for f in check_world(house(more))] == [
-        "house.toml:15: d: expected hall and den on one level, got a step of 0.20 m"]
+    assert [str(f) for f in check_world(house(more))] == [f"house.toml:{told}"]
 
 
 def test_a_finish_of_a_locale_without_walls_is_refused() -> None:

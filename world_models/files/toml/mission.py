@@ -15,8 +15,7 @@ from typing import Any, get_args, get_type_hints
 from world_models.building.world import World
 from world_models.commands import check_command, check_destination, parse_destination
 from world_models.entries.location import diagonal
-from world_models.entries.task import Command
-from world_models.entries.user_reports import DOOR_STATES, GO_ON, Redirection, ReportedState, UserReport
+from world_models.entries.task import DOOR_STATES, GO_ON, Command, Redirection, ReportedState, UserReport
 from world_models.files.packed import SUFFIXES
 from world_models.files.toml.settings_reader import (
     MAX_NUMBER,
