@@ -1,0 +1,544 @@
+"""The map of a building while it is explored: stands, walls and uprights along two axes, all found together.
+
+Headings come from the axes, picture by picture; then all that is measured is linear: the foot of a wall is so far from
+a stand, an upright lies on its wall where a ray from a stand meets it, and wheels tell from stand to stand. Unknown are
+two numbers a stand and one a wall and an upright, solved by reweighted least squares with their covariance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harvey_survey.axis_view import AxisView, Bases, FloorLooks, Uprights, is_floor
+from world_models.files.construction.rooms import CASING_WIDTH_M
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Key = tuple[str | int | float, ...]
+
+OUTWARD = ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0))
+"""From a room through its south, east, north and west wall."""
+ACROSS, SIGN = (1, 0, 1, 0), (-1.0, 1.0, 1.0, -1.0)
+"""Of each side: the axis across it, and whether it lies at the room's larger end of that."""
+SAME_WALL_M = 0.12
+"""Feet of walls so near to a wall that is known are of it."""
+MIN_WALL_M = 0.5
+"""So much of the foot of a wall must be seen."""
+SAME_UPRIGHT_M, SHIFTS_M = 0.05, 0.2
+"""Uprights so near on a wall are one; and by how much all of one stand may be shifted by the wheels' errors."""
+MAX_SLANT = 2.5
+"""Walls are read where they are seen under no larger tangent from their normal."""
+BEYOND_M, BEYOND_SHARE = (0.3, 1.0), 0.75
+"""Floor so far behind a wall, in such a share, says that it is open there."""
+PROFILE_M = 0.02
+DOOR_M = (0.55, 2.2)
+JAMB_M, JAMB_LOW_M, JAMB_HIGH_M = 0.16, 0.3, 1.5
+"""A doorway ends at an upright so near to where the floor behind ends, that reaches from so low to so high."""
+GAP_M, STEP_OVER_M = 0.12, 0.35
+"""Of floor that is seen along a ray: what does not look like it, up to so long; and so long in a doorway."""
+LOSS_SIGMAS = 2.5
+REACH_SIGMA = 0.012
+"""Of what the wheels move for each metre that they count."""
+SHADED_M = 0.09
+"""So much of a doorway's width a jamb may hide. Its edge is told by the outer edge of the board round it, whose colour
+differs from the wall's; the inner edges are of one colour."""
+BEHIND_WALL_M = 0.35
+"""The wall behind a doorway lies so near to the one before it."""
+SAME_FAR_WALL_M = 0.04
+"""Feet of walls seen through a doorway that are so near to a wall of the room behind are of it, beside their own
+deviations."""
+
+
+@dataclass(eq=False)
+class Stand:
+    """Where the robot stood: position (2,) as believed when it was made [m], its pictures, and the room."""
+
+    position: Floats
+    views: list[AxisView]
+    room: str
+
+
+@dataclass(eq=False)
+class LearntDoor:
+    """A doorway: of which room and wall, from where to where along it [m], and the room behind, once known."""
+
+    room: str
+    side: int
+    ends_m: tuple[float, float]
+    behind: str | None = None
+    far_ends_m: tuple[float, float] | None = None
+    tried: int = 0
+
+
+@dataclass(eq=False)
+class LearntRoom:
+    """A room: its walls' offsets by side, None where none was seen yet; the looks of its floor.
+
+    Attributes:
+        reach: by side how far the walls beside were seen, where none ends the room yet.
+        back: the side by which it was entered, and about where its wall must be.
+    """
+
+    name: str
+    floor: FloorLooks
+    walls: list[float | None] = field(default_factory=lambda: [None] * 4)
+    reach: list[float] = field(default_factory=lambda: [0.0] * 4)
+    height_m: float = 2.7
+    back: tuple[int, float] | None = None
+
+    def limit(self, side: int) -> float:
+        """Where a wall is, or how far the room was seen there [m]."""
+        wall = self.walls[side]
+        return self.reach[side] if wall is None else wall
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """x from, y from, x to, y to."""
+        return self.limit(3), self.limit(0), self.limit(1), self.limit(2)
+
+    def contains(self, point: Floats, margin_m: float = 0.0) -> bool:
+        x0, y0, x1, y1 = self.box
+        return bool(x0 + margin_m <= point[0] <= x1 - margin_m and y0 + margin_m <= point[1] <= y1 - margin_m)
+
+    def span(self, side: int) -> tuple[float, float]:
+        """From where to where a wall goes, along it."""
+        x0, y0, x1, y1 = self.box
+        return (x0, x1) if ACROSS[side] == 1 else (y0, y1)
+
+
+@dataclass(frozen=True, slots=True)
+class _Equation:
+    terms: tuple[tuple[Key, float], ...]
+    value: float
+    sigma: float
+
+
+class AxisMap:
+    """All of it. Positions and offsets are in the axes' frame, with its origin at the first stand."""
+
+    def __init__(self) -> None:
+        self.stands: list[Stand] = []
+        self.rooms: dict[str, LearntRoom] = {}
+        self.doors: list[LearntDoor] = []
+        self.values: dict[Key, float] = {}
+        self.sigmas: dict[Key, float] = {}
+        self.upright_ends: dict[Key, tuple[float, float]] = {}
+        self._equations: list[_Equation] = []
+        self._open: dict[int, tuple[tuple[float, ...], list[tuple[int, float, bool]]]] = {}
+        self._points: dict[int, tuple[Key, Floats]] = {}
+
+    # -- what is known ---------------------------------------------------------------------------------------------
+
+    def position(self, stand: int) -> Floats:
+        """(2,) where a stand is [m]."""
+        return np.array([self.values["stand", stand, 0], self.values["stand", stand, 1]])
+
+    def room_at(self, point: Floats) -> str | None:
+        """The room in which a point lies."""
+        return next((name for name, room in self.rooms.items() if room.contains(point)), None)
+
+    def uprights_on(self, room: str, side: int) -> list[Key]:
+        """Names of the uprights on a wall, by their place."""
+        found = [key for key in self.values if key[:3] == ("upright", room, side)]
+        return sorted(found, key=self.values.__getitem__)
+
+    # -- what is added ---------------------------------------------------------------------------------------------
+
+    def add_stand(self, moved: Floats, sigma_m: Floats, views: Sequence[AxisView], room: str) -> int:
+        """A stand that the wheels put ``moved`` (2,) from the last one; returns its number.
+
+        Args:
+            moved: [m] were the wheels as they are believed to be: by how much more they move is found with all else.
+            sigma_m: (2,) its deviations, without those of the wheels' measure.
+        """
+        n = len(self.stands)
+        last = self.position(n - 1) if n else np.zeros(2)
+        self.stands.append(Stand(last + moved, list(views), room))
+        if not n:
+            self.values["reach",] = 0.0
+            self._equations.append(_Equation(((("reach",), 1.0),), 0.0, REACH_SIGMA))
+        for axis in (0, 1):
+            self.sigmas["stand", n, axis] = math.hypot(
+                self.sigmas.get(("stand", n - 1, axis), 0.0), float(sigma_m[axis]), REACH_SIGMA * float(moved[axis]))
+            self.values["stand", n, axis] = float(last[axis] + moved[axis] * (1.0 + self.values["reach",]))
+            terms: tuple[tuple[Key, float], ...] = ((("stand", n, axis), 1.0),)
+            if n:
+                terms = (*terms, (("stand", n - 1, axis), -1.0), (("reach",), -float(moved[axis])))
+            self._equations.append(_Equation(terms, float(moved[axis]), float(sigma_m[axis]) if n else 1e-4))
+        return n
+
+    def read_walls(self, stand: int, floors: Sequence[FloorLooks]) -> None:
+        """Pair the feet of walls that a stand saw with the walls of its room, and make those that are not known yet."""
+        s = self.stands[stand]
+        room = self.rooms[s.room]
+        seen = [(view, view.find_bases(floors)) for view in s.views]
+        while (found := self._find_wall(room, stand, seen)) is not None:
+            self.set_wall(room, *found)
+        if room.back is not None and room.walls[room.back[0]] is None:
+            self.set_wall(room, *room.back)
+            self._equations.append(_Equation(((("wall", room.name, room.back[0]), 1.0),), room.back[1], 0.1))
+        for side in range(4):
+            self._grow_reach(room, side, stand, seen)
+        rooms = [room, *(self.rooms[name] for name in self._beside(room.name))]
+        for view, bases in seen:
+            for k in range(len(bases.side)):
+                any(self._pair_base(one, stand, view, bases, k, one is room) for one in rooms)
+        self.solve()
+
+    def read_through(self, stand: int, room: str, floors: Sequence[FloorLooks]) -> None:
+        """Pair the feet of walls that a stand saw through a doorway with those of the room behind, that is known now."""
+        for view in self.stands[stand].views:
+            bases = view.find_bases(floors)
+            for k in range(len(bases.side)):
+                self._pair_base(self.rooms[room], stand, view, bases, k, False)
+        self.solve()
+
+    def _beside(self, room: str) -> list[str]:
+        """The rooms behind the doorways of a room."""
+        found = [door.behind for door in self.doors if door.room == room and door.behind is not None]
+        return [*found, *(door.room for door in self.doors if door.behind == room)]
+
+    def _pair_base(
+        self, room: LearntRoom, stand: int, view: AxisView, bases: Bases, k: int, is_own: bool
+    ) -> bool:
+        side = int(bases.side[k])
+        axis, wall = ACROSS[side], room.walls[side]
+        here = self.position(stand)
+        if wall is None:
+            return False
+        near = SAME_WALL_M if is_own else SAME_FAR_WALL_M + 2.0 * float(
+            bases.sigma_m[k] + abs(self.sigmas["stand", stand, axis] - self.sigmas.get(("wall", room.name, side), 0.0)))
+        if abs(here[axis] + view.forward_m[axis] + bases.offset_m[k] - wall) > near:
+            return False
+        low, high = room.span(side)
+        along = bases.along_m[k] + here[1 - axis] + view.forward_m[1 - axis]
+        if is_own and (along[1] < low - 0.1 or along[0] > high + 0.1):
+            return False
+        if not is_own and (along[0] < low - 0.1 or along[1] > high + 0.1):
+            return False
+        terms: tuple[tuple[Key, float], ...] = ((("wall", room.name, side), 1.0), (("stand", stand, axis), -1.0))
+        self._equations.append(
+            _Equation(terms, float(bases.offset_m[k] + view.forward_m[axis]), float(bases.sigma_m[k])))
+        return True
+
+    def _grow_reach(
+        self, room: LearntRoom, side: int, stand: int, seen: Sequence[tuple[AxisView, Bases]]
+    ) -> None:
+        """How far the walls beside are seen in a direction: where no wall ends the room yet, it goes so far."""
+        axis, sign = ACROSS[side], SIGN[side]
+        here = self.position(stand)
+        far = [here[axis] + sign * 0.5]
+        for view, bases in seen:
+            for k in np.flatnonzero((bases.side % 2 != side % 2)):
+                wall = room.walls[int(bases.side[k])]
+                at = here[1 - axis] + view.forward_m[1 - axis] + bases.offset_m[k]
+                if wall is not None and abs(at - wall) < SAME_WALL_M:
+                    far.extend((bases.along_m[k] + here[axis] + view.forward_m[axis]).tolist())
+        best = max(far, key=lambda m: sign * m)
+        known = room.reach[side]
+        room.reach[side] = best if known == 0.0 or sign * best > sign * known else known
+
+    def _find_wall(
+        self, room: LearntRoom, stand: int, seen: Sequence[tuple[AxisView, Bases]]
+    ) -> tuple[int, float] | None:
+        """Of the sides where no wall is known, that of whose wall most is seen, between the walls that are known."""
+        here = self.position(stand)
+        best, most = None, MIN_WALL_M
+        for side in (side for side in range(4) if room.walls[side] is None):
+            axis, sign = ACROSS[side], SIGN[side]
+            ends = [room.walls[other] for other in ((3, 1) if axis == 1 else (0, 2))]
+            low, high = (-math.inf if ends[0] is None else ends[0] - 0.1, math.inf if ends[1] is None else ends[1] + 0.1)
+            rows = []
+            for view, bases in seen:
+                for k in np.flatnonzero(bases.side == side):
+                    along = bases.along_m[k] + here[1 - axis] + view.forward_m[1 - axis]
+                    at = float(here[axis] + view.forward_m[axis] + bases.offset_m[k])
+                    if room.back is not None and room.back[0] == side and abs(at - room.back[1]) > BEHIND_WALL_M:
+                        continue
+                    if low <= along[0] and along[1] <= high and sign * (at - here[axis]) > 0.0:
+                        rows.append((at, tuple(along.tolist())))
+            for offset, _ in rows:
+                near = [(at, along) for at, along in rows if abs(at - offset) < 0.04]
+                covered = _measure_union([along for _, along in near])
+                if covered > most:
+                    best, most = (side, float(np.median([at for at, _ in near]))), covered
+        return best
+
+    def set_wall(self, room: LearntRoom, side: int, offset_m: float) -> None:
+        """A wall where none was known."""
+        room.walls[side] = offset_m
+        self.values["wall", room.name, side] = offset_m
+
+    def read_uprights(self, stand: int) -> None:
+        """Pair the uprights that a stand saw with those on its room's walls, and make those that are not known yet."""
+        s = self.stands[stand]
+        room = self.rooms[s.room]
+        found = []
+        for view in s.views:
+            eye = self.position(stand) + view.forward_m
+            found += [(view, view.uprights, k, side, along, slant, far)
+                      for k in range(len(view.uprights.bearing_rad))
+                      for side, along, slant, far in [meet_wall(room, eye, float(view.uprights.bearing_rad[k]))]
+                      if side >= 0 and abs(slant) < MAX_SLANT and room.walls[side] is not None]
+        shift = [self._find_shift(room.name, [(f[3], f[4]) for f in found if ACROSS[f[3]] != axis],
+                                  self.sigmas["stand", stand, axis]) for axis in (0, 1)]
+        for view, uprights, k, side, along, slant, far in found:
+            self._pair_upright(room, stand, view, uprights, k, side, along + shift[1 - ACROSS[side]], slant, far)
+        self.solve()
+
+    def _find_shift(self, room: str, places: Sequence[tuple[int, float]], sigma_m: float) -> float:
+        """By how much all uprights of a stand are to be shifted along an axis, to lie on those that are known.
+
+        ``sigma_m`` is the stand's deviation along it.
+        """
+        best, most, far = 0.0, 0.0, min(SHIFTS_M, 3.0 * sigma_m)
+        known = {side: np.array([self.values[key] for key in self.uprights_on(room, side)]) for side in range(4)}
+        for shift in sorted(np.arange(-0.01 * (far // 0.01), far + 0.001, 0.01), key=abs):
+            score = 0.0
+            for side, along in places:
+                if len(known[side]):
+                    score += max(0.0, 1.0 - (float(np.abs(known[side] - along - shift).min()) / 0.03) ** 2)
+            score -= 0.5 * (float(shift) / sigma_m) ** 2
+            if score > most + 0.5:
+                best, most = float(shift), score
+        return best
+
+    def _pair_upright(
+        self, room: LearntRoom, stand: int, view: AxisView, uprights: Uprights, k: int, side: int, along: float,
+        slant: float, far: float,
+    ) -> None:
+        low, high = room.span(side)
+        if not low + 0.04 < along < high - 0.04 or any(
+                door.room == room.name and door.side == side and door.ends_m[0] + 0.04 < along < door.ends_m[1] - 0.04
+                for door in self.doors):
+            return
+        axis = ACROSS[side]
+        height = view.mount.height_m
+        ends = height + far * float(uprights.slope[k, 0]), height + far * float(uprights.slope[k, 1])
+        near = [key for key in self.uprights_on(room.name, side) if abs(self.values[key] - along) < SAME_UPRIGHT_M]
+        if near:
+            key = min(near, key=lambda one: abs(self.values[one] - along))
+            before = self.upright_ends[key]
+            ends = min(before[0], ends[0]), max(before[1], ends[1])
+        else:
+            key = "upright", room.name, side, sum(one[:3] == ("upright", room.name, side) for one in self.values)
+            self.values[key] = along
+        self.upright_ends[key] = ends
+        forward = view.forward_m
+        terms: tuple[tuple[Key, float], ...] = (
+            (key, 1.0), (("stand", stand, 1 - axis), -1.0), (("wall", room.name, side), -slant),
+            (("stand", stand, axis), slant))
+        sigma = math.hypot(far * math.hypot(1.0, slant) * float(uprights.sigma_rad[k]), 0.004)
+        self._equations.append(_Equation(terms, float(forward[1 - axis] - slant * forward[axis]), sigma))
+
+    # -- all together ----------------------------------------------------------------------------------------------
+
+    def solve(self) -> None:
+        """Find all unknowns by all equations, with a loss that forgets wrong pairs; take walls over into the rooms."""
+        names = sorted(self.values, key=repr)
+        index = {name: i for i, name in enumerate(names)}
+        rows = len(self._equations)
+        slopes, value, sigma = np.zeros((rows, len(names))), np.zeros(rows), np.zeros(rows)
+        for r, equation in enumerate(self._equations):
+            for name, factor in equation.terms:
+                slopes[r, index[name]] += factor
+            value[r], sigma[r] = equation.value, equation.sigma
+        state = np.array([self.values[name] for name in names])
+        for _ in range(6):
+            left = (value - slopes @ state) / sigma
+            root = np.sqrt(1.0 / (1.0 + (left / LOSS_SIGMAS) ** 2)) / sigma
+            weighted = slopes * root[:, None]
+            information = weighted.T @ weighted + 1e-9 * np.eye(len(names))
+            state = state + np.linalg.solve(information, weighted.T @ (root * (value - slopes @ state)))
+        deviations = np.sqrt(np.diag(np.linalg.inv(information)))
+        self.values = dict(zip(names, state.tolist(), strict=True))
+        self.sigmas = dict(zip(names, deviations.tolist(), strict=True))
+        for room in self.rooms.values():
+            room.walls = [self.values.get(("wall", room.name, side)) for side in range(4)]
+
+    # -- what is open ----------------------------------------------------------------------------------------------
+
+    def see_open(self, stand: int, floors: Sequence[FloorLooks]) -> list[tuple[int, float, bool]]:
+        """Of each ray that meets a wall of the stand's room: side, where along it, and whether floor is seen behind."""
+        s = self.stands[stand]
+        room = self.rooms[s.room]
+        key = (len(floors), *np.round(room.box, 2), *np.round(self.position(stand), 2))
+        if self._open.get(stand, (None, []))[0] == key:
+            return self._open[stand][1]
+        found: list[tuple[int, float, bool]] = []
+        self._open[stand] = key, found
+        for view in s.views:
+            eye = self.position(stand) + view.forward_m
+            like, known = is_floor(view.polar, floors), np.isfinite(view.polar[..., 0])
+            for i, bearing in enumerate(view.bearings.tolist()):
+                side, along, slant, far = meet_wall(room, eye, bearing)
+                if side < 0 or room.walls[side] is None or abs(slant) > MAX_SLANT:
+                    continue
+                near = abs(room.limit(side) - eye[ACROSS[side]])
+                window = [far * (near + m) / near for m in BEYOND_M]
+                rows = known[i] & (view.distances_m >= window[0]) & (view.distances_m <= window[1])
+                if np.count_nonzero(rows) >= 4:
+                    found.append((side, along, bool(like[i, rows].mean() >= BEYOND_SHARE)))
+        return found
+
+    def find_doors(self, room_name: str, floors: Sequence[FloorLooks]) -> list[tuple[int, float, float]]:
+        """Doorways of a room: side, and from where to where along it, by all stands in it."""
+        room = self.rooms[room_name]
+        rays = [ray for n, stand in enumerate(self.stands) if stand.room == room_name for ray in self.see_open(n, floors)]
+        doors = []
+        for side in range(4):
+            low, high = room.span(side)
+            count = max(1, math.ceil((high - low) / PROFILE_M))
+            yes = np.zeros(count, int)
+            for _, along, is_open in (ray for ray in rays if ray[0] == side):
+                k = int((along - low) / PROFILE_M)
+                if 0 <= k < count and is_open:
+                    yes[k] += 1
+            for a, b in _find_runs(yes > 0, 5):
+                ends = low + a * PROFILE_M, low + b * PROFILE_M
+                if ends[1] - ends[0] < 0.25:
+                    continue
+                snapped = self._snap(room_name, side, ends)
+                if snapped is not None and DOOR_M[0] < snapped[1] - snapped[0] < DOOR_M[1]:
+                    doors.append((side, *snapped))
+        return doors
+
+    def find_gaps(self, room: str, side: int) -> list[tuple[float, float]]:
+        """Pairs of neighbouring tall uprights as far apart as the jambs of a doorway."""
+        tall = [self.values[key] for key in self.uprights_on(room, side)
+                if self.upright_ends[key][0] < JAMB_LOW_M and self.upright_ends[key][1] > JAMB_HIGH_M]
+        return [(a, b) for a, b in zip(tall, tall[1:], strict=False) if DOOR_M[0] < b - a < DOOR_M[1]]
+
+    def looks_behind(self, stand: int, side: int, low_m: float, high_m: float) -> Floats | None:
+        """Looks (n, 3) of what may be floor behind a wall, between two uprights; None where it cannot be.
+
+        It is alike all over, is not what is seen beside the uprights, and ends below the horizon.
+        """
+        s = self.stands[stand]
+        room = self.rooms[s.room]
+        inside: list[Floats] = []
+        outside: list[Floats] = []
+        rest: list[Floats] = []
+        for view in s.views:
+            eye = self.position(stand) + view.forward_m
+            known = np.isfinite(view.polar[..., 0])
+            for i, bearing in enumerate(view.bearings.tolist()):
+                met, along, slant, far = meet_wall(room, eye, bearing)
+                if met != side or room.walls[side] is None or abs(slant) > 1.5:
+                    continue
+                near = abs(room.limit(side) - eye[ACROSS[side]])
+                window = [far * (near + m) / near for m in BEYOND_M]
+                rows = known[i] & (view.distances_m >= window[0]) & (view.distances_m <= window[1])
+                if low_m + 0.15 < along < high_m - 0.15:
+                    inside.append(view.polar[i, rows])
+                    rest.append(view.polar[i, known[i] & (view.distances_m > window[1])])
+                elif low_m - 0.6 < along < low_m - 0.15 or high_m + 0.15 < along < high_m + 0.6:
+                    outside.append(view.polar[i, rows])
+        if len(inside) < 5 or not outside or sum(map(len, outside)) < 20 or sum(map(len, inside)) < 200:
+            return None
+        looks = np.concatenate(inside)
+        wide = np.diag([0.07**2, 0.008**2, 0.008**2])
+        floor = FloorLooks(np.median(looks, axis=0), wide, np.zeros(3))
+        if floor.is_like(looks).mean() < 0.85 or floor.is_like(np.concatenate(outside)).mean() > 0.3:
+            return None
+        ends = np.mean([len(row) > 0 and not floor.is_like(row)[-12:].any() for row in rest])
+        return looks if ends > 0.7 else None
+
+    def _snap(self, room: str, side: int, ends: tuple[float, float]) -> tuple[float, float] | None:
+        """Where a doorway ends, by the tall uprights outside of where floor is seen behind: the boards round it."""
+        tall = [self.values[key] for key in self.uprights_on(room, side)
+                if self.upright_ends[key][0] < JAMB_LOW_M and self.upright_ends[key][1] > JAMB_HIGH_M]
+        left = [x for x in tall if ends[0] - 0.4 < x < ends[0] + 0.06]
+        right = [x for x in tall if ends[1] - 0.06 < x < ends[1] + 0.4]
+        if not left or not right:
+            return None
+        low = [x for x in left if x > ends[0] - CASING_WIDTH_M - SHADED_M]
+        high = [x for x in right if x < ends[1] + CASING_WIDTH_M + SHADED_M]
+        return (min(low) + CASING_WIDTH_M if low else max(left)), (max(high) - CASING_WIDTH_M if high else min(right))
+
+    # -- floor that was seen ---------------------------------------------------------------------------------------
+
+    def floor_points(self, stand: int, floors: Sequence[FloorLooks]) -> Floats:
+        """(n, 2) points of the floor that a stand saw, up to the walls and through doorways, from the stand [m]."""
+        s = self.stands[stand]
+        room = self.rooms[s.room]
+        here, points = self.position(stand), []
+        ways = [(door.side, door.ends_m) for door in self.doors if door.room == s.room]
+        ways += [((door.side + 2) % 4, door.far_ends_m or door.ends_m) for door in self.doors if door.behind == s.room]
+        key: Key = (len(floors), *np.round([*room.box, *here, *(m for _, ends in ways for m in ends)], 2).tolist())
+        if stand in self._points and self._points[stand][0] == key:
+            return self._points[stand][1]
+        for view in s.views:
+            eye = here + view.forward_m
+            met = [meet_wall(room, eye, bearing) for bearing in view.bearings.tolist()]
+            through = np.array([side >= 0 and any(w == side and e[0] < along < e[1] for w, e in ways)
+                                for side, along, _, _ in met])
+            walls_m = np.array([far for *_, far in met])
+            reach = _run_of_floor(view.distances_m, is_floor(view.polar, floors), np.isfinite(view.polar[..., 0]),
+                                  walls_m, through)
+            rows, columns = np.nonzero(np.isfinite(view.polar[..., 0]) & (view.distances_m <= reach[:, None]))
+            d, bearing = view.distances_m[columns], view.bearings[rows]
+            points.append(view.forward_m + d[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1))
+        self._points[stand] = key, np.concatenate(points) if points else np.zeros((0, 2))
+        return self._points[stand][1]
+
+
+def meet_wall(room: LearntRoom, eye: Floats, bearing_rad: float) -> tuple[int, float, float, float]:
+    """Where a ray from inside a room meets its walls: side, place along it, tangent from its normal, distance [m].
+
+    Side -1 where it starts outside.
+    """
+    c, s = math.cos(bearing_rad), math.sin(bearing_rad)
+    x0, y0, x1, y1 = room.box
+    if not (x0 < eye[0] < x1 and y0 < eye[1] < y1):
+        return -1, 0.0, 0.0, 0.0
+    far_x = ((x1 if c > 0.0 else x0) - eye[0]) / c if abs(c) > 1e-9 else math.inf
+    far_y = ((y1 if s > 0.0 else y0) - eye[1]) / s if abs(s) > 1e-9 else math.inf
+    if far_x < far_y:
+        return (1 if c > 0.0 else 3), float(eye[1] + far_x * s), s / c, float(far_x)
+    return (2 if s > 0.0 else 0), float(eye[0] + far_y * c), c / s, float(far_y)
+
+
+def _run_of_floor(distances_m: Floats, like: Mask, known: Mask, walls_m: Floats, through: Mask) -> Floats:
+    """(b,) how far floor is seen in each direction from the nearest that is in the picture [m]; 0 where none is.
+
+    ``like``, ``known`` (b, d): what looks like floor, and what is in the picture; ``walls_m`` (b,) where the room's wall
+    is, ``through`` (b,) where there is a doorway in it.
+    """
+    nearest = np.where(known, distances_m, np.inf).min(axis=1)
+    good = np.where(known & like, distances_m, 0.0)
+    last = np.maximum(np.maximum.accumulate(good, axis=1), nearest[:, None] - GAP_M)
+    beyond = walls_m[:, None]
+    at_sill = through[:, None] & (last >= beyond - 0.1) & (last <= beyond + 0.3)
+    ended = known & (distances_m - last > np.where(at_sill, STEP_OVER_M, GAP_M))
+    ended |= ~through[:, None] & (distances_m > beyond)
+    first = np.where(ended.any(axis=1), ended.argmax(axis=1), len(distances_m) - 1)
+    reach = np.maximum.accumulate(good, axis=1)[np.arange(len(first)), first]
+    return np.asarray(np.where(through, reach, np.minimum(reach, walls_m)))
+
+
+def _measure_union(intervals: Sequence[tuple[float, ...]]) -> float:
+    total, end = 0.0, -math.inf
+    for low, high in sorted(intervals):
+        total += max(0.0, high - max(low, end))
+        end = max(end, high)
+    return total
+
+
+def _find_runs(mask: Mask, gap: int) -> list[tuple[int, int]]:
+    """From where to where a mask is true, over gaps up to ``gap``."""
+    runs: list[list[int]] = []
+    for i in np.flatnonzero(mask).tolist():
+        if runs and i - runs[-1][1] <= gap:
+            runs[-1][1] = i + 1
+        else:
+            runs.append([i, i + 1])
+    return [(a, b) for a, b in runs]
+
+
+__all__ = ["ACROSS", "OUTWARD", "SIGN", "AxisMap", "LearntDoor", "LearntRoom", "Mapping", "Stand", "meet_wall"]

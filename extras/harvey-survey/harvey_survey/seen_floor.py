@@ -1,0 +1,162 @@
+"""Where floor was seen, and ways on it: the robot moves nowhere else."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Cell = tuple[int, int]
+
+CELL_M = 0.05
+SIDE = 2400
+"""Cells along a side of the map; its middle is the start."""
+CLOSE_CELLS = 5
+"""Holes up to so wide are of the camera's raster."""
+MARGIN_M = 0.04
+"""Kept free beside the robot's disc."""
+NEAR_BORDER_M, NEAR_BORDER_COST = 0.3, 2.0
+"""A way so near to where the floor was not seen costs so many times more."""
+
+
+class SeenFloor:
+    """A grid of the floor round the start."""
+
+    def __init__(self, radius_m: float) -> None:
+        self._seen = np.zeros((SIDE, SIDE), np.uint8)
+        self._radius_m = radius_m
+        self._walls: list[tuple[Floats, Floats]] = []
+        self._ways: list[tuple[Floats, Floats]] = []
+        self._free: Mask | None = None
+        self._away: Floats | None = None
+
+    def clear(self) -> None:
+        self._seen[:] = 0
+        self._walls, self._ways, self._free = [], [], None
+
+    def add_points(self, points: Floats) -> None:
+        """Points (n, 2) of the floor that were seen [m]."""
+        cells = _cells(points)
+        self._seen[cells[:, 0], cells[:, 1]] = 1
+        self._free = None
+
+    def add_disc(self, point: Floats, radius_m: float) -> None:
+        i, j = cell_of(point)
+        cv2.circle(self._seen, (j, i), round(radius_m / CELL_M), 1, -1)
+        self._free = None
+
+    def add_way(self, begin: Floats, end: Floats, width_m: float) -> None:
+        """A strip that the robot has driven over."""
+        (a, b), (c, d) = cell_of(begin), cell_of(end)
+        cv2.line(self._seen, (b, a), (d, c), 1, max(1, round(width_m / CELL_M)))
+        self._free = None
+
+    def add_wall(self, begin: Floats, end: Floats) -> None:
+        """A wall, along an axis: nothing leads through it but doorways."""
+        self._walls.append((begin, end))
+        self._free = None
+
+    def add_doorway(self, corner: Floats, opposite: Floats) -> None:
+        """The floor between jambs, along the axes."""
+        self._ways.append((corner, opposite))
+        self._free = None
+
+    @property
+    def seen(self) -> Mask:
+        """Where floor was seen, small holes closed; cells by x and y."""
+        kernel = np.ones((CLOSE_CELLS, CLOSE_CELLS), np.uint8)
+        closed = cv2.morphologyEx(self._seen, cv2.MORPH_CLOSE, kernel)
+        for value, boxes in ((0, self._walls), (1, self._ways)):
+            for begin, end in boxes:
+                (i0, j0), (i1, j1) = cell_of(np.minimum(begin, end)), cell_of(np.maximum(begin, end))
+                closed[i0 : i1 + 1, j0 : j1 + 1] = value
+        return np.asarray(closed.astype(bool))
+
+    def _update(self) -> None:
+        if self._free is None:
+            away = cv2.distanceTransform(self.seen.astype(np.uint8), cv2.DIST_L2, 5) * CELL_M
+            self._away = np.asarray(away, float)
+            self._free = np.asarray(away > self._radius_m + MARGIN_M)
+
+    def is_free(self, point: Floats) -> bool:
+        """Whether the robot may stand there."""
+        self._update()
+        assert self._free is not None
+        return bool(self._free[cell_of(point)])
+
+    def costs_from(self, point: Floats) -> tuple[dict[Cell, float], dict[Cell, Cell]]:
+        """Cost of the cheapest way to each cell that can be reached, and the cell before it."""
+        self._update()
+        free, away = self._free, self._away
+        assert free is not None and away is not None
+        start = self._nearest_free(cell_of(point))
+        costs, before = ({} if start is None else {start: 0.0}), dict[Cell, Cell]()
+        heap = [(0.0, start)] if start is not None else []
+        while heap:
+            cost, cell = heapq.heappop(heap)
+            if cost > costs[cell]:
+                continue
+            for di, dj in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+                other = cell[0] + di, cell[1] + dj
+                if free[other]:
+                    near = away[other] < self._radius_m + NEAR_BORDER_M
+                    there = cost + math.hypot(di, dj) * CELL_M * (NEAR_BORDER_COST if near else 1.0)
+                    if there < costs.get(other, math.inf) - 1e-12:
+                        costs[other], before[other] = there, cell
+                        heapq.heappush(heap, (there, other))
+        return costs, before
+
+    def _nearest_free(self, cell: Cell, within: int = 8) -> Cell | None:
+        assert self._free is not None
+        if self._free[cell]:
+            return cell
+        i0, j0 = cell[0] - within, cell[1] - within
+        rows = np.argwhere(self._free[i0 : cell[0] + within + 1, j0 : cell[1] + within + 1])
+        if not len(rows):
+            return None
+        i, j = rows[np.argmin(np.sum((rows - within) ** 2, axis=1))]
+        return int(i + i0), int(j + j0)
+
+    def way_to(self, goal: Cell, before: dict[Cell, Cell]) -> list[Floats]:
+        """Straight legs to a cell: their ends [m]."""
+        cells = [goal]
+        while cells[-1] in before:
+            cells.append(before[cells[-1]])
+        cells.reverse()
+        corners, here = [], 0
+        while here < len(cells) - 1:
+            there = len(cells) - 1
+            while there > here + 1 and not self._is_straight(cells[here], cells[there]):
+                there -= 1
+            corners.append(point_of(cells[there]))
+            here = there
+        return corners
+
+    def _is_straight(self, a: Cell, b: Cell) -> bool:
+        assert self._free is not None
+        steps = max(abs(a[0] - b[0]), abs(a[1] - b[1]), 1)
+        share = np.linspace(0.0, 1.0, 2 * steps + 1)
+        i = np.round(a[0] + share * (b[0] - a[0])).astype(int)
+        j = np.round(a[1] + share * (b[1] - a[1])).astype(int)
+        return bool(self._free[i, j].all())
+
+
+def cell_of(point: Floats | Sequence[float]) -> Cell:
+    """The cell of a point [m]."""
+    return int(math.floor(point[0] / CELL_M)) + SIDE // 2, int(math.floor(point[1] / CELL_M)) + SIDE // 2
+
+
+def point_of(cell: Cell) -> Floats:
+    """The middle of a cell [m]."""
+    return (np.array(cell) - SIDE // 2 + 0.5) * CELL_M
+
+
+def _cells(points: Floats) -> NDArray[np.int64]:
+    cells = np.floor(points / CELL_M).astype(np.int64) + SIDE // 2
+    return np.asarray(cells[np.all((cells >= 0) & (cells < SIDE), axis=1)])
