@@ -8,11 +8,14 @@ two numbers a stand and one a wall and an upright, solved by reweighted least sq
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from harvey_survey.axis_view import AxisView, Bases, FloorLooks, Uprights, is_floor
 from world_models.files.construction.rooms import CASING_WIDTH_M
@@ -36,12 +39,14 @@ MAX_SLANT = 2.5
 BEYOND_M, BEYOND_SHARE = (0.3, 1.0), 0.75
 """Floor so far behind a wall, in such a share, says that it is open there."""
 PROFILE_M = 0.02
+PIECE_M, CORNER_M = 0.1, 0.35
+"""Walls are read piece by piece, but for their ends."""
 DOOR_M = (0.55, 2.2)
 JAMB_M, JAMB_LOW_M, JAMB_HIGH_M = 0.16, 0.3, 1.5
 """A doorway ends at an upright so near to where the floor behind ends, that reaches from so low to so high."""
 GAP_M, STEP_OVER_M = 0.12, 0.35
 """Of floor that is seen along a ray: what does not look like it, up to so long; and so long in a doorway."""
-LOSS_SIGMAS = 2.5
+LOSS_SIGMAS, LOSS_STEPS = 2.5, 5
 REACH_SIGMA = 0.012
 """Of what the wheels move for each metre that they count."""
 SHADED_M = 0.09
@@ -191,7 +196,7 @@ class AxisMap:
         self.solve()
 
     def read_through(self, stand: int, room: str, floors: Sequence[FloorLooks]) -> None:
-        """Pair the feet of walls that a stand saw through a doorway with those of the room behind, that is known now."""
+        """Pair the feet of walls that a stand saw through a doorway with those of the room behind, known since."""
         for view in self.stands[stand].views:
             bases = view.find_bases(floors)
             for k in range(len(bases.side)):
@@ -221,10 +226,15 @@ class AxisMap:
             return False
         if not is_own and (along[0] < low - 0.1 or along[1] > high + 0.1):
             return False
-        terms: tuple[tuple[Key, float], ...] = ((("wall", room.name, side), 1.0), (("stand", stand, axis), -1.0))
-        self._equations.append(
-            _Equation(terms, float(bases.offset_m[k] + view.forward_m[axis]), float(bases.sigma_m[k])))
+        off = float(bases.offset_m[k] + view.forward_m[axis])
+        self.measure_wall(stand, room.name, side, off, float(bases.sigma_m[k]))
         return True
+
+    def measure_wall(self, stand: int, room: str, side: int, off_m: float, sigma_m: float) -> None:
+        """A wall is so far from a stand, along its axis [m]."""
+        terms: tuple[tuple[Key, float], ...] = (
+            (("wall", room, side), 1.0), (("stand", stand, ACROSS[side]), -1.0))
+        self._equations.append(_Equation(terms, off_m, sigma_m))
 
     def _grow_reach(
         self, room: LearntRoom, side: int, stand: int, seen: Sequence[tuple[AxisView, Bases]]
@@ -234,7 +244,7 @@ class AxisMap:
         here = self.position(stand)
         far = [here[axis] + sign * 0.5]
         for view, bases in seen:
-            for k in np.flatnonzero((bases.side % 2 != side % 2)):
+            for k in np.flatnonzero(bases.side % 2 != side % 2):
                 wall = room.walls[int(bases.side[k])]
                 at = here[1 - axis] + view.forward_m[1 - axis] + bases.offset_m[k]
                 if wall is not None and abs(at - wall) < SAME_WALL_M:
@@ -252,7 +262,8 @@ class AxisMap:
         for side in (side for side in range(4) if room.walls[side] is None):
             axis, sign = ACROSS[side], SIGN[side]
             ends = [room.walls[other] for other in ((3, 1) if axis == 1 else (0, 2))]
-            low, high = (-math.inf if ends[0] is None else ends[0] - 0.1, math.inf if ends[1] is None else ends[1] + 0.1)
+            low = -math.inf if ends[0] is None else ends[0] - 0.1
+            high = math.inf if ends[1] is None else ends[1] + 0.1
             rows = []
             for view, bases in seen:
                 for k in np.flatnonzero(bases.side == side):
@@ -340,24 +351,35 @@ class AxisMap:
 
     def solve(self) -> None:
         """Find all unknowns by all equations, with a loss that forgets wrong pairs; take walls over into the rooms."""
-        names = sorted(self.values, key=repr)
-        index = {name: i for i, name in enumerate(names)}
-        rows = len(self._equations)
-        slopes, value, sigma = np.zeros((rows, len(names))), np.zeros(rows), np.zeros(rows)
-        for r, equation in enumerate(self._equations):
-            for name, factor in equation.terms:
-                slopes[r, index[name]] += factor
-            value[r], sigma[r] = equation.value, equation.sigma
-        state = np.array([self.values[name] for name in names])
-        for _ in range(6):
-            left = (value - slopes @ state) / sigma
-            root = np.sqrt(1.0 / (1.0 + (left / LOSS_SIGMAS) ** 2)) / sigma
-            weighted = slopes * root[:, None]
-            information = weighted.T @ weighted + 1e-9 * np.eye(len(names))
-            state = state + np.linalg.solve(information, weighted.T @ (root * (value - slopes @ state)))
-        deviations = np.sqrt(np.diag(np.linalg.inv(information)))
-        self.values = dict(zip(names, state.tolist(), strict=True))
-        self.sigmas = dict(zip(names, deviations.tolist(), strict=True))
+        seen = Counter(equation.terms[0][0] for equation in self._equations)
+        once = [e for e in self._equations if e.terms[0][0][0] == "upright" and seen[e.terms[0][0]] == 1]
+        alone = {e.terms[0][0] for e in once}
+        equations = [e for e in self._equations if e.terms[0][0] not in alone]
+        names = [name for name in self.values if name not in alone and name[0] != "upright"]
+        marks = [name for name in self.values if name not in alone and name[0] == "upright"]
+        index = {name: i for i, name in enumerate([*names, *marks])}
+        rows = [(r, index[name], factor) for r, e in enumerate(equations) for name, factor in e.terms]
+        slopes = csr_array(([f for *_, f in rows], ([r for r, *_ in rows], [i for _, i, _ in rows])),
+                           shape=(len(equations), len(index))).tocsc()
+        few = len(names)
+        value, sigma = (np.array(part) for part in zip(*((e.value, e.sigma) for e in equations), strict=True))
+        state = np.array([self.values[name] for name in index])
+        for _ in range(LOSS_STEPS):
+            left = value - slopes @ state
+            weight = 1.0 / (1.0 + (left / sigma / LOSS_SIGMAS) ** 2) / sigma**2
+            squares, pull = slopes.T @ (slopes * weight[:, None]), slopes.T @ (weight * left)
+            own = squares.diagonal()[few:]  # uprights are eliminated, each alone
+            joined = squares.tocsr()[few:, :few].toarray() / own[:, None]
+            reduced = squares.tocsr()[:few, :few].toarray() - joined.T @ (own[:, None] * joined) + 1e-9 * np.eye(few)
+            covariance = np.linalg.inv(reduced)
+            step = covariance @ (pull[:few] - joined.T @ pull[few:])
+            state = state + np.concatenate([step, pull[few:] / own - joined @ step])
+        variances = [covariance.diagonal(), 1.0 / own + np.einsum("ui,ij,uj->u", joined, covariance, joined, optimize=True)]
+        self.values.update(zip(index, state.tolist(), strict=True))
+        self.sigmas.update(zip(index, np.sqrt(np.concatenate(variances)).tolist(), strict=True))
+        for e in once:  # what was seen once tells nothing of the rest
+            self.values[e.terms[0][0]] = e.value - math.fsum(f * self.values[name] for name, f in e.terms[1:])
+            self.sigmas[e.terms[0][0]] = e.sigma
         for room in self.rooms.values():
             room.walls = [self.values.get(("wall", room.name, side)) for side in range(4)]
 
@@ -386,10 +408,31 @@ class AxisMap:
                     found.append((side, along, bool(like[i, rows].mean() >= BEYOND_SHARE)))
         return found
 
+    def _rays_of(self, room: str, floors: Sequence[FloorLooks]) -> list[tuple[int, float, bool]]:
+        return [ray for n, stand in enumerate(self.stands) if stand.room == room for ray in self.see_open(n, floors)]
+
+    def unread_walls(self, room_name: str, floors: Sequence[FloorLooks]) -> list[tuple[int, float]]:
+        """Pieces of a room's walls of which no stand says whether they are open: side, and place along it [m]."""
+        room = self.rooms[room_name]
+        rays = self._rays_of(room_name, floors)
+        unread: list[tuple[int, float]] = []
+        for side in (side for side in range(4) if room.walls[side] is not None):
+            low, high = room.span(side)
+            places = np.arange(low + CORNER_M, high - CORNER_M, PIECE_M)
+            read = np.sort([along for s, along, _ in rays if s == side])
+            if not len(read):
+                unread += [(side, float(at)) for at in places]
+                continue
+            k = np.searchsorted(read, places)
+            after, before = read[np.minimum(k, len(read) - 1)], read[np.maximum(k - 1, 0)]
+            away = np.minimum(np.abs(after - places), np.abs(before - places))
+            unread += [(side, float(at)) for at in places[away > PIECE_M]]
+        return unread
+
     def find_doors(self, room_name: str, floors: Sequence[FloorLooks]) -> list[tuple[int, float, float]]:
         """Doorways of a room: side, and from where to where along it, by all stands in it."""
         room = self.rooms[room_name]
-        rays = [ray for n, stand in enumerate(self.stands) if stand.room == room_name for ray in self.see_open(n, floors)]
+        rays = self._rays_of(room_name, floors)
         doors = []
         for side in range(4):
             low, high = room.span(side)
@@ -412,7 +455,7 @@ class AxisMap:
         """Pairs of neighbouring tall uprights as far apart as the jambs of a doorway."""
         tall = [self.values[key] for key in self.uprights_on(room, side)
                 if self.upright_ends[key][0] < JAMB_LOW_M and self.upright_ends[key][1] > JAMB_HIGH_M]
-        return [(a, b) for a, b in zip(tall, tall[1:], strict=False) if DOOR_M[0] < b - a < DOOR_M[1]]
+        return [(a, b) for a, b in pairwise(tall) if DOOR_M[0] < b - a < DOOR_M[1]]
 
     def looks_behind(self, stand: int, side: int, low_m: float, high_m: float) -> Floats | None:
         """Looks (n, 3) of what may be floor behind a wall, between two uprights; None where it cannot be.
@@ -507,8 +550,8 @@ def meet_wall(room: LearntRoom, eye: Floats, bearing_rad: float) -> tuple[int, f
 def _run_of_floor(distances_m: Floats, like: Mask, known: Mask, walls_m: Floats, through: Mask) -> Floats:
     """(b,) how far floor is seen in each direction from the nearest that is in the picture [m]; 0 where none is.
 
-    ``like``, ``known`` (b, d): what looks like floor, and what is in the picture; ``walls_m`` (b,) where the room's wall
-    is, ``through`` (b,) where there is a doorway in it.
+    ``like``, ``known`` (b, d): what looks like floor, and what is in the picture; ``walls_m`` (b,) where the room's
+    wall is, ``through`` (b,) where there is a doorway in it.
     """
     nearest = np.where(known, distances_m, np.inf).min(axis=1)
     good = np.where(known & like, distances_m, 0.0)

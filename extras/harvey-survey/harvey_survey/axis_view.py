@@ -182,7 +182,7 @@ class AxisView:
         turned = _to_floor(_turn(lines.segments_px, lines.sigma_angle_rad), self)
         a, b = ends[:, 1] - ends[:, 0], turned[:, 1] - turned[:, 0]
         change = np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.sum(a * b, axis=1))
-        return np.nan_to_num(np.abs(change), nan=math.pi)
+        return np.asarray(np.nan_to_num(np.abs(change), nan=math.pi))
 
     def _is_foot(self, segment: Floats, floors: Sequence[FloorLooks]) -> bool:
         """Whether there is floor below a segment and none above it."""

@@ -1,15 +1,16 @@
 """Explorations of unknown floors: how like the truth is the model, and do fresh robots find their way in it?
 
-The explorer has camera, wheels and the place where it stands; the building is the simulator's. The models are laid into
-the world by the start alone. Each of the missions afterwards is by a robot that knows the explored model and nothing else,
-put down at a place of it, in the building as it is.
+The explorer has camera and wheels; the building is the simulator's. The models are laid into the world by the start
+alone. Each of the missions afterwards is by a robot that knows the explored model and nothing else, put down at a place
+of it, in the building as it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,14 @@ from harvey.agent import build_agent
 from harvey.runner.result import MissionResult
 from harvey.simulation.simulated_run import SimulatedRun, build_head
 from harvey_survey.explore_command import build_explored_stage, build_explorer
-from harvey_survey.explore_floors import compare_models, lay_into_world, match_rooms, sample_floor, write_bare_floor
+from harvey_survey.explore_floors import (
+    Likeness,
+    compare_models,
+    lay_into_world,
+    match_rooms,
+    sample_floor,
+    write_bare_floor,
+)
 from harvey_survey.explorer import ExploringStopped
 from harvey_survey.learnt_world import write_learnt_world
 from harvey_survey.seen_floor import cell_of
@@ -57,7 +65,7 @@ class Explored:
 
     Attributes:
         stopped: why it stopped; "": it came home. home_m: how far from the start it truly stands then.
-        likeness: the fields of :class:`~harvey_survey.explore_floors.Likeness`.
+        likeness: of the model to the truth.
         floor_seen: which share of the floor of all rooms it saw.
         stands, path_m, robot_s: what it took. contacts, contact_m_per_s: what it touched, and how fast.
         outcomes, errors_m: of the missions: how each ended, and how far from its goal.
@@ -66,7 +74,7 @@ class Explored:
     seed: int
     stopped: str
     home_m: float
-    likeness: dict[str, object]
+    likeness: Likeness
     floor_seen: float
     stands: int
     path_m: float
@@ -75,6 +83,10 @@ class Explored:
     contact_m_per_s: float
     outcomes: list[str]
     errors_m: list[float]
+
+    @staticmethod
+    def of_record(record: Mapping[str, Any]) -> Explored:
+        return Explored(**{**record, "likeness": Likeness(**record["likeness"])})
 
 
 def explore_floor(case: ExploreCase) -> Explored:
@@ -102,7 +114,7 @@ def explore_floor(case: ExploreCase) -> Explored:
     share = float(np.mean([seen[cell_of(point)] for point in points]))
     ends = [_drive(file, true, laid, model, rng, case.seed + k) for k in range(case.missions)]
     return Explored(
-        case.seed, stopped, truth.world_from_robot.distance_to(start), asdict(compare_models(true, model)), share,
+        case.seed, stopped, truth.world_from_robot.distance_to(start), compare_models(true, model), share,
         len(explorer.map.stands), truth.path_m, truth.time_s, truth.collisions, truth.contact_m_per_s,
         [end.outcome for end in ends], [end.error_m for end in ends])
 
@@ -119,10 +131,10 @@ def _drive(file: Path, true: World, laid: Path, model: World, rng: np.random.Gen
     names = [str(name) for name in rng.choice(sorted(pairs), 2, replace=False)]
     places = {name: _draw_place(true, name, rng) for name in names}
     heading = float(rng.uniform(0.0, 360.0))
-    own = {}
+    own: dict[str, Sequence[float]] = {}
     for name, (x, y) in places.items():
         world = true.world_from_locale(name).apply([x, y, 0.0])
-        own[name] = model.world_from_locale(pairs[name]).inverse().apply(world)[:2]
+        own[name] = model.world_from_locale(pairs[name]).inverse().apply(world)[:2].tolist()
     turn = np.degrees(np.arctan2(*model.world_from_locale(pairs[names[0]]).rotation[1::-1, 0]))
     stage = build_stage(parse_scenario(_mission(file, names, [places[name] for name in names], heading), "explored",
                                        file.parent))
@@ -154,14 +166,14 @@ def report(ends: Sequence[Explored]) -> Report:
     """The table and the claims of some explorations."""
 
     def total(name: str) -> int:
-        return sum(int(str(end.likeness[name])) for end in ends)
+        return sum(int(getattr(end.likeness, name)) for end in ends)
 
     def join(part: Callable[[Explored], Sequence[float]]) -> list[float]:
         return [value for end in ends for value in part(end)]
 
-    walls = join(lambda end: list(end.likeness["walls_m"]))  # type: ignore[call-overload]
+    walls = join(lambda end: end.likeness.walls_m)
     wall_m = float(np.median(walls)) if walls else float("inf")
-    angle = float(np.median([float(str(end.likeness["angle_deg"])) for end in ends]))
+    angle = float(np.median([end.likeness.angle_deg for end in ends]))
     precision, recall = (total(a) / max(1, total(b)) for a, b in (("own_right", "own_corners"),
                                                                    ("true_found", "true_corners")))
     f1 = 2.0 * precision * recall / max(precision + recall, 1e-9)
@@ -170,25 +182,25 @@ def report(ends: Sequence[Explored]) -> Report:
     errors, outcomes = join(lambda end: end.errors_m), [one for end in ends for one in end.outcomes]
     near = sum(o == "reached" and e <= NEAR_M for o, e in zip(outcomes, errors, strict=True))
     wrong = sum(o == "reached" and e > 0.3 for o, e in zip(outcomes, errors, strict=True))
-    rows = [(f"floor {e.seed}", f"{e.likeness['found_rooms']}/{e.likeness['rooms']}",
-             f"{e.likeness['found_doors']}/{e.likeness['doors']}", f"{e.floor_seen:.0%}",
-             100.0 * float(np.median(e.likeness["walls_m"])) if e.likeness["walls_m"] else None,  # type: ignore[arg-type]
+    rows = [(f"floor {e.seed}", f"{e.likeness.found_rooms}/{e.likeness.rooms}",
+             f"{e.likeness.found_doors}/{e.likeness.doors}", f"{e.floor_seen:.0%}",
+             100.0 * float(np.median(e.likeness.walls_m)) if e.likeness.walls_m else None,
              e.contacts, 100.0 * e.home_m, e.path_m, e.robot_s, e.stands,
              f"{sum(o == 'reached' for o in e.outcomes)}/{len(e.outcomes)}", e.stopped) for e in ends]
     floor = float(np.mean([end.floor_seen for end in ends]))
     return Report(
         "Unknown floors explored, and missions in the models",
-        ("floor", "rooms", "doorways", "floor seen", "walls off cm", "contacts", "home cm", "path m", "robot s", "stands",
-         "missions reached", "stopped"), tuple(rows),
-        notes=("Rooms are bare of furniture and doors open. A room counts whose outline shares 70 % with the true one, a"
-               " doorway within 30 cm, a corner within 10 cm. All errors are from the start: drift counts.",),
+        ("floor", "rooms", "doorways", "floor seen", "walls off cm", "contacts", "home cm", "path m", "robot s",
+         "stands", "missions reached", "stopped"), tuple(rows),
+        notes=("Rooms are bare of furniture and doors open. A room counts whose outline shares 70 % with the true one,"
+               " a doorway within 30 cm, a corner within 10 cm. All errors are from the start: drift counts.",),
         claims=(
             (f"at least 99 % of rooms: {total('found_rooms')} of {total('rooms')}",
              judge_share(total("found_rooms"), total("rooms"), 0.99)),
             (f"every doorway: {total('found_doors')} of {total('doors')}, {total('false_doors')} too many",
              total("found_doors") == total("doors") and not total("false_doors")),
             (f"at least 95 % of the floor: {floor:.1%}", floor >= 0.95),
-            (f"walls within {100 * WALL_M:g} cm and {ANGLE_DEG:g} degree (median): {100 * wall_m:.1f} cm, {angle:.2f}",
+            (f"walls within {100 * WALL_M:g} cm, {ANGLE_DEG:g} degree (median): {100 * wall_m:.1f} cm, {angle:.2f}",
              wall_m <= WALL_M and angle <= ANGLE_DEG),
             (f"corners: F1 at least 95 % at 10 cm: {f1:.1%}", f1 >= 0.95),
             (f"no contact above {SOFT_M_PER_S:g} m/s: {fast}", fast == 0),

@@ -1,4 +1,4 @@
-"""Floors to explore, drawn at random: generated floors with open doors and bare rooms; and how like the truth a model is.
+"""Floors to explore, drawn at random, with open doors and bare rooms; and how like the truth a model is.
 
 A model is laid into the world's frame by the place where the robot was put down, as it knows no other.
 """
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 STANDING = ("desk", "bookshelf", "file-cabinet", "cupboard", "rack", "table")
 """What stands on the floor, and is left out."""
 SAME_ROOM, SAME_DOOR_M, SAME_CORNER_M = 0.7, 0.3, 0.1
-"""A room is found whose outline shares so much with the true one, a doorway whose middle is so near, a corner so near."""
+"""A room is found whose outline shares so much with the true one, a doorway whose middle is so near, a corner."""
 
 
 def write_bare_floor(folder: Path, seed: int, rooms: int) -> Path:
@@ -39,7 +39,7 @@ def write_bare_floor(folder: Path, seed: int, rooms: int) -> Path:
 
 
 def lay_into_world(learnt: Path, start: Pose2, start_rad: float) -> Path:
-    """Write a world file with the model in the world's frame; ``start_rad`` is the robot's heading at the start in it."""
+    """Write the model in the world's frame; ``start_rad`` is the robot's heading at the start, in the model's."""
     x, y = start.x_m, start.y_m
     path = learnt.with_name(f"{learnt.stem}-in-world.toml")
     path.write_text(f'name = "{learnt.stem}"\nunits = "metres"\n[locales.explored]\nkind = "building"\n'
@@ -55,8 +55,8 @@ class Likeness:
     Attributes:
         rooms, found_rooms, false_rooms; doors, found_doors, false_doors: how many.
         walls_m: how far each wall of a room that was found is off, along its normal; angle_deg: of the axes.
-        own_right, own_corners; true_found, true_corners: of the model's corners how many are near a true one, and of the
-            true ones how many near one of the model's.
+        own_right, own_corners; true_found, true_corners: of the model's corners how many are near a true one, and of
+            the true ones how many near one of the model's.
     """
 
     rooms: int
@@ -124,7 +124,7 @@ def _share(one: Floats, other: Floats) -> float:
 
 def _measure_walls(true: Floats, own: Floats) -> list[float]:
     ends = np.stack([true.min(axis=0), true.max(axis=0)]) - np.stack([own.min(axis=0), own.max(axis=0)])
-    return np.abs(ends).ravel().tolist()
+    return [float(end) for end in np.abs(ends).ravel()]
 
 
 def _near(point: Floats, others: Sequence[Floats] | Floats, within_m: float) -> bool:

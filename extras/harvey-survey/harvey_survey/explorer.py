@@ -1,8 +1,8 @@
 """Explores a building of which nothing is known: looks round, drives to where something is not known yet, comes home.
 
-What it wants to know: the floor of a room that it has not seen, a room without a wall on one side, and what is behind a
-doorway (B. Yamauchi, A frontier-based approach for autonomous exploration, 1997). It moves only where it has seen floor;
-but the floor nearer than its picture begins, round the start alone, somebody has looked at who put it down there.
+What it wants to know: the floor of a room that it has not seen, walls that it has not read, and what is behind a
+doorway (B. Yamauchi, A frontier-based approach for autonomous exploration, 1997). It moves only where it has seen
+floor; but round the start, nearer than its picture begins, whoever put it down there has looked.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from harvey_survey.axis_map import ACROSS, OUTWARD, AxisMap, LearntDoor, LearntRoom
 from harvey_survey.axis_view import AxisView, FloorLooks, see_axes
 from harvey_survey.seen_floor import CELL_M, Cell, SeenFloor, cell_of, point_of
-from knowledge_sources.methods.floor.appearance import compute_appearance, fit_appearance
+from knowledge_sources.methods.floor.appearance import fit_appearance
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries import BodyFault, CameraPicture, Contact, MotionReport, MotorCommand
@@ -42,6 +42,11 @@ SAME_FLOOR = 9.0
 MIN_GAIN_M2, MIN_GAIN_SHARE, GAIN_M = 0.3, 0.02, (1.8, 7.0)
 """It goes on looking in a room while so much more floor of it would be seen, from so far."""
 COST_PER_M2 = 0.15
+UNREAD_M2, READ_SLANT = 0.1, 2.0
+"""A piece of a wall of which it is not known whether it is open counts as so much floor, where it would be seen so
+straight (tangent from its normal)."""
+LOOKED_M = 0.7
+"""It looks round only so far from where it has."""
 DISC_M = 0.4
 WALL_M, DOORWAY_M = 0.08, 0.25
 """A wall is at least so thick; so far behind its front floor is taken for seen between jambs."""
@@ -135,7 +140,7 @@ class Explorer:
         rooms, doors = len(self.map.rooms), [door for door in self.map.doors if door.behind is not None]
         left = len(self.map.doors) - len(doors)
         unseen = f", {left} not gone through" if left else ""
-        end = f"stopped: {stopped}" if stopped else f"home: {100.0 * np.hypot(*self.here):.0f} cm from the start, it believes"
+        end = f"stopped: {stopped}" if stopped else f"home, {100.0 * np.hypot(*self.here):.0f} cm from the start"
         return f"{rooms} rooms, {len(doors)} doorways{unseen}, by {len(self.map.stands)} stands; {end}"
 
     @property
@@ -293,18 +298,20 @@ class Explorer:
         for room in self.map.rooms.values():
             x0, y0, x1, y1 = room.box
             (i0, j0), (i1, j1) = cell_of((x0 + 0.1, y0 + 0.1)), cell_of((x1 - 0.1, y1 - 0.1))
-            unseen = np.argwhere(~seen[i0:i1, j0:j1]) + (i0, j0)
+            unseen = np.argwhere(~seen[i0:i1, j0:j1]) + np.array([i0, j0])
             spots = [cell for cell in costs if i0 <= cell[0] < i1 and j0 <= cell[1] < j1
                      and cell[0] % 6 == 0 and cell[1] % 6 == 0]
+            been = [self.map.position(n) for n, stand in enumerate(self.map.stands) if len(stand.views) >= LOOKS - 2]
             spots = [cell for cell in spots if not any(
-                np.hypot(*(point_of(cell) - point)) < 0.5 for point in self._given_up)]
+                np.hypot(*(point_of(cell) - point)) < LOOKED_M for point in (*self._given_up, *been))]
             if not spots:
                 continue
             enough = max(MIN_GAIN_M2, MIN_GAIN_SHARE * (x1 - x0) * (y1 - y0))
-            gains = [_gain(cell, unseen) for cell in spots]
+            unread = self.map.unread_walls(room.name, self._floors)
+            gains = [_gain(cell, unseen) + UNREAD_M2 * _count_read(room, point_of(cell), unread) for cell in spots]
             best = max(range(len(spots)), key=lambda k: gains[k] - COST_PER_M2 * costs[spots[k]])
             if gains[best] > enough:
-                goals.append(Goal(spots[best], costs[spots[best]], None, f"floor of {room.name} not seen"))
+                goals.append(Goal(spots[best], costs[spots[best]], None, f"{room.name} is not seen whole"))
             for side in (side for side in range(4) if room.walls[side] is None):
                 out = np.array(OUTWARD[side])
                 far = max(spots, key=lambda cell: float(point_of(cell) @ out))
@@ -321,11 +328,11 @@ class Explorer:
             return
         out = OUTWARD[door.side]
         facing = math.atan2(out[1], out[0])
-        views = []
+        glances = []
         for aside in (0.0, GLANCE_RAD, -GLANCE_RAD):
             self._turn_to(facing + aside)
-            views.append(self._see())
-        self._add_stand(np.zeros(2), np.full(2, 0.004), [view for view in views if view is not None], door.room)
+            glances.append(self._see())
+        self._add_stand(np.zeros(2), np.full(2, 0.004), [view for view in glances if view is not None], door.room)
         before = len(self.map.stands) - 1
         costs, _ = self.floor.costs_from(self.here)
         for behind_m in (BEHIND_DOOR_M, 1.0, 0.8):
@@ -413,7 +420,7 @@ def _colour_of(mean: Floats) -> Floats:
     """The colour (3,) 0..255 whose looks these are."""
     total = math.exp(float(mean[0]))
     red, blue = (float(mean[k]) * total - 2.0 for k in (1, 2))
-    return np.clip(np.array([red, total - 6.0 - red - blue, blue]), 0.0, 255.0)
+    return np.asarray(np.clip(np.array([red, total - 6.0 - red - blue, blue]), 0.0, 255.0))
 
 
 def _near_cell(point: Floats, costs: dict[Cell, float], within: int) -> Cell | None:
@@ -432,4 +439,10 @@ def _gain(cell: Cell, unseen: NDArray[np.int64]) -> float:
     return float(np.count_nonzero((away > GAIN_M[0]) & (away < GAIN_M[1]))) * CELL_M**2
 
 
-__all__ = ["Explorer", "ExploringBody", "ExploringStopped", "Goal", "compute_appearance"]
+def _count_read(room: LearntRoom, point: Floats, unread: list[tuple[int, float]]) -> int:
+    """How many pieces of walls would be seen straight enough from a point."""
+    return sum(abs(along - point[1 - ACROSS[side]]) < READ_SLANT * abs(room.limit(side) - point[ACROSS[side]])
+               for side, along in unread)
+
+
+__all__ = ["Explorer", "ExploringBody", "ExploringStopped", "Goal"]

@@ -1,8 +1,8 @@
 """What was explored as a world file: rooms, doorways, and what hangs on the walls, by the pictures of all stands.
 
 Each wall is seen straight on, every point of it in the picture that shows it best; what differs from the wall's colour
-and fills a rectangle is taken over as a board of that colour. Colours are those of the pictures, less the light that the
-model expects.
+and fills a rectangle is taken over as a board of that colour. Colours are those of the pictures, less the light that
+the model expects.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ from numpy.typing import NDArray
 from harvey_survey.axis_map import ACROSS, OUTWARD, SIGN, AxisMap, LearntDoor, LearntRoom, meet_wall
 from world_models.building.geometry.faces import AMBIENT, LAMP_DIRECTION
 from world_models.files.construction.rooms import (
-    BASEBOARD_DEPTH_M, BASEBOARD_HEIGHT_M, CASING_WIDTH_M, MOULDING_DEPTH_M, MOULDING_HEIGHT_M,
+    BASEBOARD_DEPTH_M,
+    BASEBOARD_HEIGHT_M,
+    CASING_WIDTH_M,
+    MOULDING_DEPTH_M,
+    MOULDING_HEIGHT_M,
 )
 
 Floats = NDArray[np.float64]
@@ -45,7 +49,7 @@ SIGMA_CM = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A rectangle on a wall: from where to where along it and above the floor [m], its colour 0..1, and what is on it."""
+    """A rectangle on a wall: from where to where along it and up [m], its colour 0..255, and what is on it."""
 
     along_m: tuple[float, float]
     up_m: tuple[float, float]
@@ -137,7 +141,7 @@ def measure_height(built: AxisMap, room: LearntRoom) -> float:
 
 def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, float]]) -> list[Board]:
     """The rectangles on a wall that differ from it, outside its doorways."""
-    rows, columns = wall.seen.shape
+    columns = wall.seen.shape[1]
     usable = wall.seen.copy()
     usable[: int((BASEBOARD_HEIGHT_M + 0.04) / PIXEL_M)] = False
     usable[int((height_m - MOULDING_HEIGHT_M - 0.05) / PIXEL_M) :] = False
@@ -145,8 +149,9 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
     usable[:, :edge], usable[:, columns - edge :] = False, False
     for low, high in doors:
         margin = CASING_WIDTH_M + 0.05
-        usable[:, max(0, int((low - margin - wall.start_m) / PIXEL_M)) : int((high + margin - wall.start_m) / PIXEL_M)] = (
-            False)
+        columns_of = slice(max(0, int((low - margin - wall.start_m) / PIXEL_M)),
+                           max(0, int((high + margin - wall.start_m) / PIXEL_M)))
+        usable[:, columns_of] = False
     if np.count_nonzero(usable) < 100:
         return []
     smooth = cv2.medianBlur(wall.picture.astype(np.uint8), 5).astype(float)
@@ -219,7 +224,7 @@ def write_learnt_world(built: AxisMap, name: str) -> str:
         locales.append(_format_room(built, room, finishes))
     for number, door in enumerate(door for door in built.doors if door.behind in built.rooms):
         doors.append(_format_door(built, door, number + 1, finishes))
-    head = [f"# Made by harvey explore: {len(built.rooms)} rooms, {len(doors)} doorways, by {len(built.stands)} stands.",
+    head = [f"# By harvey explore: {len(built.rooms)} rooms, {len(doors)} doorways, by {len(built.stands)} stands.",
             "# Metres. The start is the origin; x and y are the building's axes.",
             f'name = "{name}"', 'units = "metres"', f"sigma_cm = {SIGMA_CM:g}", "", "[finishes]",
             'unknown = { colour = "unknown" }', *(f"{key} = {value}" for key, value in finishes.items()), "",
@@ -236,7 +241,8 @@ def _format_room(built: AxisMap, room: LearntRoom, finishes: dict[str, str]) -> 
     back = BASEBOARD_DEPTH_M if boarded is not None else 0.0
     x0, y0, x1, y1 = room.box
     origin, size = (x0 - back, y0 - back), (x1 - x0 + 2.0 * back, y1 - y0 + 2.0 * back)
-    walls, things = [], []
+    walls: list[str] = []
+    things: list[str] = []
     for side, view in enumerate(views):
         ways = [ends for wall, ends in list_ways(built, room.name) if wall == side]
         colour = view.colour(room.span(side), (0.2, room.height_m - 0.2))
@@ -275,7 +281,8 @@ def _has_strip(views: Sequence[WallView], up_m: tuple[float, float], beside_m: t
 
 def _format_board(board: Board, side: int, origin_m: float, name: str, finishes: dict[str, str]) -> str:
     middle, up = 0.5 * (board.along_m[0] + board.along_m[1]), 0.5 * (board.up_m[0] + board.up_m[1])
-    boxes, depth, one = [], BOARD_DEPTH_M, board
+    boxes: list[str] = []
+    depth, one = BOARD_DEPTH_M, board
     while True:
         # A box's x is to the right of who stands with the back to the wall.
         x = sorted(_right_of(side) * (end - middle) for end in one.along_m)

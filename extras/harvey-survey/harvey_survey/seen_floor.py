@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 from collections.abc import Sequence
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -34,7 +35,7 @@ class SeenFloor:
         self._walls: list[tuple[Floats, Floats]] = []
         self._ways: list[tuple[Floats, Floats]] = []
         self._free: Mask | None = None
-        self._away: Floats | None = None
+        self._away: NDArray[np.float32] | None = None
 
     def clear(self) -> None:
         self._seen[:] = 0
@@ -80,9 +81,11 @@ class SeenFloor:
 
     def _update(self) -> None:
         if self._free is None:
-            away = cv2.distanceTransform(self.seen.astype(np.uint8), cv2.DIST_L2, 5) * CELL_M
-            self._away = np.asarray(away, float)
-            self._free = np.asarray(away > self._radius_m + MARGIN_M)
+            seen, self._away = self.seen, np.zeros((SIDE, SIDE), np.float32)
+            (i0, i1), (j0, j1) = (np.flatnonzero(seen.any(axis=k))[[0, -1]] + (-1, 2) for k in (1, 0))
+            self._away[i0:i1, j0:j1] = CELL_M * cv2.distanceTransform(
+                seen[i0:i1, j0:j1].astype(np.uint8), cv2.DIST_L2, 5)
+            self._free = np.asarray(self._away > self._radius_m + MARGIN_M)
 
     def is_free(self, point: Floats) -> bool:
         """Whether the robot may stand there."""
@@ -96,21 +99,26 @@ class SeenFloor:
         free, away = self._free, self._away
         assert free is not None and away is not None
         start = self._nearest_free(cell_of(point))
-        costs, before = ({} if start is None else {start: 0.0}), dict[Cell, Cell]()
-        heap = [(0.0, start)] if start is not None else []
-        while heap:
-            cost, cell = heapq.heappop(heap)
-            if cost > costs[cell]:
-                continue
-            for di, dj in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-                other = cell[0] + di, cell[1] + dj
-                if free[other]:
-                    near = away[other] < self._radius_m + NEAR_BORDER_M
-                    there = cost + math.hypot(di, dj) * CELL_M * (NEAR_BORDER_COST if near else 1.0)
-                    if there < costs.get(other, math.inf) - 1e-12:
-                        costs[other], before[other] = there, cell
-                        heapq.heappush(heap, (there, other))
-        return costs, before
+        if start is None:
+            return {}, {}
+        cells = np.argwhere(free)
+        number = np.zeros(free.shape, np.int32)
+        number[cells[:, 0], cells[:, 1]] = np.arange(len(cells))
+        begins, ends, lengths = [], [], []
+        slow = np.where(away[cells[:, 0], cells[:, 1]] < self._radius_m + NEAR_BORDER_M, NEAR_BORDER_COST, 1.0)
+        for step in ((1, 0), (0, 1), (1, 1), (1, -1)):
+            there = cells + step
+            joined = np.flatnonzero(free[there[:, 0], there[:, 1]])
+            i, j = there[joined].T
+            begins.append(joined)
+            ends.append(number[i, j])
+            lengths.append(0.5 * (slow[joined] + slow[number[i, j]]) * math.hypot(*step) * CELL_M)
+        graph = csr_array((np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))),
+                          shape=(len(cells), len(cells)))
+        found, last = dijkstra(graph, directed=False, indices=int(number[start]), return_predecessors=True)
+        names = list(map(tuple, cells.tolist()))
+        costs = {names[k]: float(found[k]) for k in np.flatnonzero(np.isfinite(found))}
+        return costs, {names[k]: names[last[k]] for k in np.flatnonzero(last >= 0)}
 
     def _nearest_free(self, cell: Cell, within: int = 8) -> Cell | None:
         assert self._free is not None
@@ -149,7 +157,7 @@ class SeenFloor:
 
 def cell_of(point: Floats | Sequence[float]) -> Cell:
     """The cell of a point [m]."""
-    return int(math.floor(point[0] / CELL_M)) + SIDE // 2, int(math.floor(point[1] / CELL_M)) + SIDE // 2
+    return math.floor(point[0] / CELL_M) + SIDE // 2, math.floor(point[1] / CELL_M) + SIDE // 2
 
 
 def point_of(cell: Cell) -> Floats:
