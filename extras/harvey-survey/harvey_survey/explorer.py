@@ -47,7 +47,8 @@ UNREAD_M2, READ_SLANT = 0.1, 2.0
 straight (tangent from its normal)."""
 LOOKED_M = 0.7
 """It looks round only so far from where it has."""
-DISC_M = 0.4
+DISC_M = 0.42
+"""Where it stood and drove there is floor: its own disc, with the margin beside it."""
 WALL_M, DOORWAY_M = 0.08, 0.25
 """A wall is at least so thick; so far behind its front floor is taken for seen between jambs."""
 BETWEEN_WALLS_M = 0.12
@@ -244,9 +245,9 @@ class Explorer:
         for n in range(len(self.map.stands)):
             here = self.map.position(n)
             self.floor.add_points(here + self.map.floor_points(n, self._floors))
-            self.floor.add_disc(here, DISC_M + 0.1)
+            self.floor.add_disc(here, DISC_M)
             if last is not None:
-                self.floor.add_way(last, here, 2.0 * DISC_M + 0.1)
+                self.floor.add_way(last, here, 2.0 * DISC_M)
             last = here
         self.floor.add_disc(self.map.position(0), self._blind_m)
         for room in self.map.rooms.values():

@@ -68,12 +68,12 @@ class KeptBody:
 
 
 @pytest.fixture(scope="module")
-def explored(stage: Stage) -> tuple[Explorer, SimulatedBody, Pose2, list[float]]:
-    """An explorer at home again, its body, the true start, and how far each stand truly was from any unseen floor."""
+def explored(stage: Stage) -> tuple[Explorer, SimulatedBody, Pose2]:
+    """An explorer at home again, its body, and the true start."""
     body = stage.body(0)
     start, explorer = body.truth.world_from_robot, build_explorer(stage, body)
     explorer.explore()
-    return explorer, body, start, []
+    return explorer, body, start
 
 
 def test_a_picture_tells_the_heading_and_how_well(stage: Stage) -> None:
@@ -132,9 +132,9 @@ def test_no_way_leads_through_a_wall_but_by_a_doorway() -> None:
 
 
 def test_what_is_explored_is_the_building(
-    file: Path, tmp_path: Path, explored: tuple[Explorer, SimulatedBody, Pose2, list[float]]
+    file: Path, tmp_path: Path, explored: tuple[Explorer, SimulatedBody, Pose2]
 ) -> None:
-    explorer, body, start, _ = explored
+    explorer, body, start = explored
     learnt = tmp_path / "learnt.toml"
     learnt.write_text(write_learnt_world(explorer.map, "learnt"), "utf-8")
     found = compare_models(load_world(file), load_world(lay_into_world(learnt, start, explorer.start_rad)))
@@ -145,8 +145,8 @@ def test_what_is_explored_is_the_building(
     assert (body.truth.collisions, body.truth.world_from_robot.distance_to(start) < 0.1) == (0, True)
 
 
-def test_it_has_seen_the_floor_where_it_drove(explored: tuple[Explorer, SimulatedBody, Pose2, list[float]]) -> None:
-    explorer, body, start, _ = explored
+def test_it_has_seen_the_floor_where_it_drove(explored: tuple[Explorer, SimulatedBody, Pose2]) -> None:
+    explorer, body, start = explored
     axes_from_world = (start @ Pose2(0.0, 0.0, -explorer.start_rad)).inverse()
     seen = explorer.floor.seen
     track = np.array([truth.world_from_robot.position for truth in body.track])
@@ -172,7 +172,7 @@ def test_a_contact_stops_it(stage: Stage) -> None:
     body = KeptBody(stage.body(3))
     explorer = build_explorer(stage, body)  # type: ignore[arg-type]
     explorer.take_step()
-    touched = Contact(0.0, 0.0)
+    touched = Contact("bumper", 0.0, 0.1, 0.0)
     body.take_contact = lambda: touched  # type: ignore[method-assign]
     with pytest.raises(ExploringStopped, match="touched"):
         explorer.take_step()
