@@ -258,7 +258,7 @@ class AxisMap:
     ) -> tuple[int, float] | None:
         """Of the sides where no wall is known, that of whose wall most is seen, between the walls that are known."""
         here = self.position(stand)
-        best, most = None, MIN_WALL_M
+        best, most = None, 0.0
         for side in (side for side in range(4) if room.walls[side] is None):
             axis, sign = ACROSS[side], SIGN[side]
             ends = [room.walls[other] for other in ((3, 1) if axis == 1 else (0, 2))]
@@ -275,7 +275,10 @@ class AxisMap:
                         rows.append((at, tuple(along.tolist())))
             for offset, _ in rows:
                 near = [(at, along) for at, along in rows if abs(at - offset) < 0.04]
-                covered = _measure_union([along for _, along in near])
+                if _measure_union([along for _, along in near]) < MIN_WALL_M:
+                    continue
+                away, middle = abs(offset - here[axis]), here[1 - axis]  # what is far and long is seen as short
+                covered = _measure_union([tuple(math.atan2(end - middle, away) for end in along) for _, along in near])
                 if covered > most:
                     best, most = (side, float(np.median([at for at, _ in near]))), covered
         return best
