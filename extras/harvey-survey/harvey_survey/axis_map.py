@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -377,7 +377,7 @@ class AxisMap:
             covariance = np.linalg.inv(reduced)
             step = covariance @ (pull[:few] - joined.T @ pull[few:])
             state = state + np.concatenate([step, pull[few:] / own - joined @ step])
-        variances = [covariance.diagonal(), 1.0 / own + np.einsum("ui,ij,uj->u", joined, covariance, joined, optimize=True)]
+        variances = [covariance.diagonal(), 1.0 / own + np.sum((joined @ covariance) * joined, axis=1)]
         self.values.update(zip(index, state.tolist(), strict=True))
         self.sigmas.update(zip(index, np.sqrt(np.concatenate(variances)).tolist(), strict=True))
         for e in once:  # what was seen once tells nothing of the rest
@@ -585,6 +585,3 @@ def _find_runs(mask: Mask, gap: int) -> list[tuple[int, int]]:
         else:
             runs.append([i, i + 1])
     return [(a, b) for a, b in runs]
-
-
-__all__ = ["ACROSS", "OUTWARD", "SIGN", "AxisMap", "LearntDoor", "LearntRoom", "Mapping", "Stand", "meet_wall"]

@@ -89,7 +89,7 @@ def _run(args: Namespace) -> int:
 
 EXPLORE = CliCommand(
     "explore", "a world file of a building of which the robot is told nothing",
-    (("harvey explore --world two_ways --start north-hall --out mine.toml --plan mine.png", "look round, drive, come home"),
+    (("harvey explore --world two_ways --start north-hall --out mine.toml --plan mine.png", "look round, drive, home"),
      ("harvey world check mine.toml", "what it has found"),
      ("harvey experiment explore --quick", "how well, on a drawn floor")),
     _arguments, _run,

@@ -136,9 +136,10 @@ def _drive(file: Path, true: World, laid: Path, model: World, rng: np.random.Gen
         world = true.world_from_locale(name).apply([x, y, 0.0])
         own[name] = model.world_from_locale(pairs[name]).inverse().apply(world)[:2].tolist()
     turn = np.degrees(np.arctan2(*model.world_from_locale(pairs[names[0]]).rotation[1::-1, 0]))
-    stage = build_stage(parse_scenario(_mission(file, names, [places[name] for name in names], heading), "explored",
-                                       file.parent))
-    text = _mission(laid, [pairs[name] for name in names], [own[name] for name in names], (heading - float(turn)) % 360.0)
+    mission = _mission(file, names, [places[name] for name in names], heading)
+    stage = build_stage(parse_scenario(mission, "explored", file.parent))
+    inside, ways = [pairs[name] for name in names], [own[name] for name in names]
+    text = _mission(laid, inside, ways, (heading - float(turn)) % 360.0)
     knows = build_head(replace(stage, scenario=parse_scenario(text, "explored", file.parent)), seed)
     agent = build_agent(knows)
     with SimulatedRun(stage, knows, agent, RunRecorder(None, knows, agent.world, agent.robot)) as run:

@@ -31,7 +31,7 @@ LOOKS = 8
 GLANCE_RAD = math.radians(28.0)
 """Pictures to both sides, of a doorway."""
 MAX_LEG_M = 1.6
-TURN_RAD = math.radians(0.7)
+TURN_RAD = math.radians(0.4)
 """A heading further off is corrected before it moves."""
 BEFORE_DOOR_M, BEHIND_DOOR_M = 1.9, 1.2
 """So far before a doorway it looks through, and so far behind the wall it looks round, in the room behind."""
@@ -47,7 +47,7 @@ UNREAD_M2, READ_SLANT = 0.1, 2.0
 straight (tangent from its normal)."""
 LOOKED_M = 0.7
 """It looks round only so far from where it has."""
-DISC_M = 0.42
+DISC_M = 0.45
 """Where it stood and drove there is floor: its own disc, with the margin beside it."""
 WALL_M, DOORWAY_M = 0.08, 0.25
 """A wall is at least so thick; so far behind its front floor is taken for seen between jambs."""
@@ -94,6 +94,7 @@ class Explorer:
         self._body, self._camera, self._mount, self._actuator = body, camera, mount, actuator
         self._tell, self._floors = tell, list[FloorLooks]()
         self._given_up: list[Floats] = []
+        self._turned_rad, self._moved_m = list[float](), list[float]()
 
     # -- the whole -------------------------------------------------------------------------------------------------
 
@@ -379,14 +380,18 @@ class Explorer:
     def _drive(self, goal: Floats) -> None:
         """Turn to a point, and move towards it."""
         step = goal - self.here
-        self._turn_to(math.atan2(step[1], step[0]))
         distance = min(float(np.hypot(*step)), MAX_LEG_M)
+        bend_per_m = sum(self._turned_rad) / max(sum(self._moved_m), 1.0)  # how the wheels drift, by what was driven
+        self._turn_to(math.atan2(step[1], step[0]) - 0.5 * bend_per_m * distance)
         before_rad = self.heading_rad
         report = self._command(0.0, self._actuator.compute_command_m(distance))
         moved_m = self._actuator.reach * report.move_m
         self.heading_rad = before_rad
         view = self._see()
-        middle = before_rad + 0.5 * wrap_angle(self.heading_rad - before_rad)
+        turned_rad = wrap_angle(self.heading_rad - before_rad)
+        self._turned_rad.append(turned_rad)
+        self._moved_m.append(moved_m)
+        middle = before_rad + 0.5 * turned_rad
         c, s = math.cos(middle), math.sin(middle)
         along, aside = 0.004 * moved_m + 0.003, 0.004 + 0.003 * moved_m
         sigma = np.hypot([c * along, s * along], [s * aside, c * aside])
@@ -444,6 +449,3 @@ def _count_read(room: LearntRoom, point: Floats, unread: list[tuple[int, float]]
     """How many pieces of walls would be seen straight enough from a point."""
     return sum(abs(along - point[1 - ACROSS[side]]) < READ_SLANT * abs(room.limit(side) - point[ACROSS[side]])
                for side, along in unread)
-
-
-__all__ = ["Explorer", "ExploringBody", "ExploringStopped", "Goal"]

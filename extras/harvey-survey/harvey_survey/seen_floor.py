@@ -20,10 +20,11 @@ SIDE = 2400
 """Cells along a side of the map; its middle is the start."""
 CLOSE_CELLS = 5
 """Holes up to so wide are of the camera's raster."""
-MARGIN_M = 0.04
+MARGIN_M = 0.07
 """Kept free beside the robot's disc."""
-NEAR_BORDER_M, NEAR_BORDER_COST = 0.3, 2.0
-"""A way so near to where the floor was not seen costs so many times more."""
+NEAR_BORDER_M, NEAR_BORDER_COST, NEARER_M = 0.3, 8.0, 0.02
+"""A way nearer than that to where the floor was not seen costs up to so many times more; and a straight way is not
+taken for a bent one if it comes so much nearer."""
 
 
 class SeenFloor:
@@ -105,7 +106,8 @@ class SeenFloor:
         number = np.zeros(free.shape, np.int32)
         number[cells[:, 0], cells[:, 1]] = np.arange(len(cells))
         begins, ends, lengths = [], [], []
-        slow = np.where(away[cells[:, 0], cells[:, 1]] < self._radius_m + NEAR_BORDER_M, NEAR_BORDER_COST, 1.0)
+        near = (self._radius_m + NEAR_BORDER_M - away[cells[:, 0], cells[:, 1]]) / NEAR_BORDER_M
+        slow = 1.0 + NEAR_BORDER_COST * np.maximum(near, 0.0) ** 2
         for step in ((1, 0), (0, 1), (1, 1), (1, -1)):
             there = cells + step
             joined = np.flatnonzero(free[there[:, 0], there[:, 1]])
@@ -140,19 +142,19 @@ class SeenFloor:
         corners, here = [], 0
         while here < len(cells) - 1:
             there = len(cells) - 1
-            while there > here + 1 and not self._is_straight(cells[here], cells[there]):
+            while there > here + 1 and not self._is_as_free(cells[here : there + 1]):
                 there -= 1
             corners.append(point_of(cells[there]))
             here = there
         return corners
 
-    def _is_straight(self, a: Cell, b: Cell) -> bool:
-        assert self._free is not None
-        steps = max(abs(a[0] - b[0]), abs(a[1] - b[1]), 1)
-        share = np.linspace(0.0, 1.0, 2 * steps + 1)
-        i = np.round(a[0] + share * (b[0] - a[0])).astype(int)
-        j = np.round(a[1] + share * (b[1] - a[1])).astype(int)
-        return bool(self._free[i, j].all())
+    def _is_as_free(self, way: list[Cell]) -> bool:
+        """Whether straight from the first to the last of these cells is about as far from the border as they are."""
+        assert self._away is not None
+        share = np.linspace(0.0, 1.0, 2 * len(way))[:, None]
+        i, j = np.round(np.array(way[0]) + share * (np.array(way[-1]) - way[0])).astype(int).T
+        wi, wj = np.array(way).T
+        return bool(self._away[i, j].min() >= self._away[wi, wj].min() - NEARER_M)
 
 
 def cell_of(point: Floats | Sequence[float]) -> Cell:

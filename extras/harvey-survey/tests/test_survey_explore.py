@@ -179,7 +179,8 @@ def test_a_contact_stops_it(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize(("more", "expected"), [
-    (["--out", "learnt.txt"], "ends in .toml"), (["--out", "x.toml", "--start", "nowhere"], "--start: expected a room")])
+    (["--out", "learnt.txt"], "ends in .toml"), (["--out", "x.toml", "--start", "nowhere"], "--start: expected a room"),
+])
 def test_the_command_says_what_it_expects(file: Path, more: list[str], expected: str) -> None:
     assert isinstance(EXPLORE, CliCommand)
     from argparse import ArgumentParser
