@@ -95,12 +95,16 @@ def view_wall(built: AxisMap, room: LearntRoom, side: int) -> WallView:
             far = away * np.hypot(1.0, slant)
             cost = np.where((slant < MAX_SLANT) & (far > SIGHT_M[0]) & (far < SIGHT_M[1]), far * np.hypot(1.0, slant),
                             np.inf)
-            if not np.isfinite(cost).any():
+            facing = points[0, :, :2] - eye
+            ahead = facing @ [math.cos(view.heading_rad), math.sin(view.heading_rad)]
+            near = np.flatnonzero(np.isfinite(cost) & (ahead > 0.5 * np.hypot(*facing.T)))
+            if not len(near):
                 continue
-            local = points - [eye[0], eye[1], 0.0]
-            colours, inside = view.colours_at(local)
-            better = inside & (cost < best)
-            picture[better], best = colours[better], np.where(better, cost, best)
+            part = slice(near[0], near[-1] + 1)
+            colours, inside = view.colours_at(points[:, part] - [eye[0], eye[1], 0.0])
+            better = inside & (cost[part] < best[:, part])
+            picture[:, part][better] = colours[better]
+            best[:, part] = np.where(better, cost[part], best[:, part])
     return WallView(picture, np.isfinite(best), low)
 
 
@@ -218,12 +222,13 @@ def write_learnt_world(built: AxisMap, name: str) -> str:
     """The text of a world file, in metres, in the axes' frame. The first room has the start."""
     finishes: dict[str, str] = {}
     locales, doors = [], []
+    views: dict[str, list[WallView]] = {}
     for room in built.rooms.values():
         room.height_m = measure_height(built, room)
-    for room in built.rooms.values():
-        locales.append(_format_room(built, room, finishes))
+        views[room.name] = [view_wall(built, room, side) for side in range(4)]
+        locales.append(_format_room(built, room, views[room.name], finishes))
     for number, door in enumerate(door for door in built.doors if door.behind in built.rooms):
-        doors.append(_format_door(built, door, number + 1, finishes))
+        doors.append(_format_door(built, door, views[door.room][door.side], number + 1, finishes))
     head = [f"# By harvey explore: {len(built.rooms)} rooms, {len(doors)} doorways, by {len(built.stands)} stands.",
             "# Metres. The start is the origin; x and y are the building's axes.",
             f'name = "{name}"', 'units = "metres"', f"sigma_cm = {SIGMA_CM:g}", "", "[finishes]",
@@ -233,8 +238,7 @@ def write_learnt_world(built: AxisMap, name: str) -> str:
     return "\n".join([*head, *locales, "", "[doors]", *doors]) + "\n"
 
 
-def _format_room(built: AxisMap, room: LearntRoom, finishes: dict[str, str]) -> str:
-    views = [view_wall(built, room, side) for side in range(4)]
+def _format_room(built: AxisMap, room: LearntRoom, views: Sequence[WallView], finishes: dict[str, str]) -> str:
     boarded = _has_strip(views, (0.02, BASEBOARD_HEIGHT_M - 0.02), (0.14, 0.4))
     moulded = _has_strip(views, (room.height_m - MOULDING_HEIGHT_M + 0.02, room.height_m - 0.025),
                          (room.height_m - 0.4, room.height_m - 0.14))
@@ -304,11 +308,12 @@ def _right_of(side: int) -> float:
     return right[1 - ACROSS[side]]
 
 
-def _format_door(built: AxisMap, door: LearntDoor, number: int, finishes: dict[str, str]) -> str:
+def _format_door(
+    built: AxisMap, door: LearntDoor, view: WallView, number: int, finishes: dict[str, str]
+) -> str:
     room = built.rooms[door.room]
     ends = np.array([door.ends_m] if door.far_ends_m is None else [door.ends_m, door.far_ends_m])
     low, high = ends.mean(axis=0)
-    view = view_wall(built, room, door.side)
     height_m, frame = _measure_door(view, low, high)
     back = BASEBOARD_DEPTH_M
     start = (room.box[0] if ACROSS[door.side] == 1 else room.box[1]) - back
