@@ -118,7 +118,7 @@ class SeenFloor:
         graph = csr_array((np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))),
                           shape=(len(cells), len(cells)))
         found, last = dijkstra(graph, directed=False, indices=int(number[start]), return_predecessors=True)
-        names = list(map(tuple, cells.tolist()))
+        names: list[Cell] = [(i, j) for i, j in cells.tolist()]
         costs = {names[k]: float(found[k]) for k in np.flatnonzero(np.isfinite(found))}
         return costs, {names[k]: names[last[k]] for k in np.flatnonzero(last >= 0)}
 
