@@ -32,8 +32,6 @@ SAME_WALL_M = 0.12
 """Feet of walls so near to a wall that is known are of it."""
 MIN_WALL_M = 0.5
 """So much of the foot of a wall must be seen."""
-CORNER_RAD, SAME_CORNER_M = 0.6, 0.04
-"""Where the feet of other walls end at a wall there is a corner: that says as much of it as so wide a view, twice."""
 SAME_UPRIGHT_M, SHIFTS_M = 0.05, 0.2
 """Uprights so near on a wall are one; and by how much all of one stand may be shifted by the wheels' errors."""
 MAX_SLANT = 2.5
@@ -267,9 +265,6 @@ class AxisMap:
             low = -math.inf if ends[0] is None else ends[0] - 0.1
             high = math.inf if ends[1] is None else ends[1] + 0.1
             rows = []
-            ends_m = [bases.along_m[bases.side % 2 != side % 2].ravel() + here[axis] + view.forward_m[axis]
-                      for view, bases in seen]
-            corners = np.concatenate([*ends_m, np.zeros(0)])
             for view, bases in seen:
                 for k in np.flatnonzero(bases.side == side):
                     along = bases.along_m[k] + here[1 - axis] + view.forward_m[1 - axis]
@@ -284,7 +279,6 @@ class AxisMap:
                     continue
                 away, middle = abs(offset - here[axis]), here[1 - axis]  # what is far and long is seen as short
                 covered = _measure_union([tuple(math.atan2(end - middle, away) for end in along) for _, along in near])
-                covered += CORNER_RAD * min(2, int(np.count_nonzero(np.abs(corners - offset) < SAME_CORNER_M)))
                 if covered > most:
                     best, most = (side, float(np.median([at for at, _ in near]))), covered
         return best

@@ -42,8 +42,8 @@ from world_models.units import FOOT_M
 FLOORS, MISSIONS = 20, 10
 QUICK_FLOORS, QUICK_MISSIONS = 1, 3
 ROOMS = (4, 10)
-FIRST_SEED = 600_000
-"""The floors of seeds 7001 to 7009 are those by which the explorer was made."""
+FIRST_SEED = 610_000
+"""The floors of seeds 7001, 7009 and 600000 are those by which the explorer was made."""
 MARGIN_M = 0.8
 """Start and goal are so far from the walls."""
 NEAR_M, WALL_M, ANGLE_DEG, HOME_M, SOFT_M_PER_S = 0.05, 0.03, 1.0, 0.1, 0.1

@@ -8,7 +8,7 @@ floor; but round the start, nearer than its picture begins, whoever put it down 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -182,10 +182,11 @@ class Explorer:
         self._see_floor()
 
     def _open_room(self, name: str, views: list[AxisView]) -> LearntRoom:
-        """A room that is new: its floor looks as that nearest to the robot does."""
-        near = np.concatenate([view.polar[:, _near(view)].reshape(-1, 3) for view in views])
-        near = near[np.isfinite(near[:, 0])]
-        floor = self._learn_floor(near)
+        """A room that is new: its floor looks as that nearest in the picture where it ends; a wall goes on upwards."""
+        every = (view.polar[:, _near(view)].reshape(-1, 3) for view in views)
+        near = [looks[np.isfinite(looks[:, 0])] for looks in every]
+        best = max(near, key=lambda looks: _count_ends(looks, views), default=np.zeros((0, 3)))
+        floor = self._learn_floor(best)
         if floor is None:
             raise ExploringStopped("the floor where it stands is not seen")
         room = self.map.rooms[name] = LearntRoom(name, floor)
@@ -420,6 +421,19 @@ class Explorer:
 def _near(view: AxisView) -> NDArray[np.bool_]:
     known = np.isfinite(view.polar[..., 0]).any(axis=0)
     return np.asarray(view.distances_m < view.distances_m[known][0] + NEAR_FLOOR_M)
+
+
+def _count_ends(looks: Floats, views: Sequence[AxisView]) -> int:
+    """In how many directions what has mostly these looks (n, 3) is nearest, and ends below the horizon."""
+    fit = fit_appearance(looks, np.median(looks, axis=0), False) if len(looks) else None
+    if fit is None:
+        return 0
+    floor, count = FloorLooks(fit[0], 2.0 * fit[1], np.zeros(3)), 0
+    for view in views:
+        like, known = floor.is_like(view.polar), np.isfinite(view.polar[..., 0])
+        first = known.argmax(axis=1)
+        count += int(np.count_nonzero(like[np.arange(len(like)), first] & ~like[:, -12:].any(axis=1)))
+    return count
 
 
 def _colour_of(mean: Floats) -> Floats:
