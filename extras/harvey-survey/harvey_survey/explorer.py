@@ -19,6 +19,7 @@ from harvey_survey.axis_map import ACROSS, OUTWARD, AxisMap, LearntDoor, LearntR
 from harvey_survey.axis_view import AxisView, FloorLooks, see_axes
 from harvey_survey.seen_floor import CELL_M, Cell, SeenFloor, cell_of, point_of
 from knowledge_sources.methods.floor.appearance import fit_appearance
+from knowledge_sources.methods.motion.clearance import choose_move
 from world_models.actuator import ActuatorModel
 from world_models.camera import Camera, CameraMount
 from world_models.entries import BodyFault, CameraPicture, Contact, MotionReport, MotorCommand
@@ -30,7 +31,9 @@ LOOKS = 8
 """Pictures of a look round."""
 GLANCE_RAD = math.radians(28.0)
 """Pictures to both sides, of a doorway."""
-MAX_LEG_M = 1.6
+MAX_LEG_M, MAX_LEGS = 1.6, 40
+BORNE_M_PER_S, LEG_S = 0.09, 3.0
+"""Speed at which a certain touch is borne, and what a leg takes besides moving: its turn and picture."""
 TURN_RAD = math.radians(0.4)
 """A heading further off is corrected before it moves."""
 BEFORE_DOOR_M, BEHIND_DOOR_M = 1.9, 1.2
@@ -365,7 +368,7 @@ class Explorer:
 
     def _go_to(self, cell: Cell) -> bool:
         """On floor that was seen, to a cell; whether it got there."""
-        for _ in range(12):
+        for _ in range(MAX_LEGS):
             costs, before = self.floor.costs_from(self.here)
             goal = _near_cell(point_of(cell), costs, 3)
             if goal is None:
@@ -379,13 +382,15 @@ class Explorer:
         return False
 
     def _drive(self, goal: Floats) -> None:
-        """Turn to a point, and move towards it."""
+        """Turn to a point, and move towards it, as fast as what may be touched on the way allows."""
         step = goal - self.here
-        distance = min(float(np.hypot(*step)), MAX_LEG_M)
+        distance, speed_m_per_s = choose_move(
+            self.floor.find_clearance(self.here, goal), min(float(np.hypot(*step)), MAX_LEG_M), self._actuator,
+            BORNE_M_PER_S, LEG_S)
         bend_per_m = sum(self._turned_rad) / max(sum(self._moved_m), 1.0)  # how the wheels drift, by what was driven
         self._turn_to(math.atan2(step[1], step[0]) - 0.5 * bend_per_m * distance)
         before_rad = self.heading_rad
-        report = self._command(0.0, self._actuator.compute_command_m(distance))
+        report = self._command(0.0, self._actuator.compute_command_m(distance), speed_m_per_s)
         moved_m = self._actuator.reach * report.move_m
         self.heading_rad = before_rad
         view = self._see()
@@ -408,8 +413,8 @@ class Explorer:
             self._command(turn, 0.0)
             self._see()
 
-    def _command(self, turn_rad: float, move_m: float) -> MotionReport:
-        report = self._body.execute(MotorCommand(turn_rad, move_m))
+    def _command(self, turn_rad: float, move_m: float, speed_m_per_s: float | None = None) -> MotionReport:
+        report = self._body.execute(MotorCommand(turn_rad, move_m, speed_m_per_s))
         if isinstance(report, BodyFault):
             raise ExploringStopped(f"the base failed: {report.what}")
         self.heading_rad = wrap_angle(self.heading_rad + report.turn_rad)

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from knowledge_sources.methods.motion.clearance import Clearance
+
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Cell = tuple[int, int]
@@ -25,6 +27,9 @@ MARGIN_M = 0.07
 NEAR_BORDER_M, NEAR_BORDER_COST, NEARER_M = 0.3, 8.0, 0.02
 """A way nearer than that to where the floor was not seen costs up to so many times more; and a straight way is not
 taken for a bent one if it comes so much nearer."""
+TOUCH = ((0.15, 1.0), (0.35, 0.2))
+"""The robot's disc so near to where floor was not seen, or to a wall, touches something with this probability at most:
+walls are off by centimetres, jambs and the wheels too."""
 
 
 class SeenFloor:
@@ -93,6 +98,17 @@ class SeenFloor:
         self._update()
         assert self._free is not None
         return bool(self._free[cell_of(point)])
+
+    def find_clearance(self, begin: Floats, end: Floats) -> Clearance:
+        """Where on a straight way something may be touched."""
+        self._update()
+        assert self._away is not None
+        length_m = float(np.hypot(*(end - begin)))
+        at_m = np.arange(0.0, length_m + CELL_M, CELL_M)
+        cells = _cells(begin + at_m[:, None] * (end - begin) / max(length_m, CELL_M))
+        spare_m = self._away[cells[:, 0], cells[:, 1]] - self._radius_m
+        p = np.select([spare_m < near_m for near_m, _ in TOUCH], [p for _, p in TOUCH])
+        return Clearance(at_m[p > 0.0], p[p > 0.0], math.inf)
 
     def costs_from(self, point: Floats) -> tuple[dict[Cell, float], dict[Cell, Cell]]:
         """Cost of the cheapest way to each cell that can be reached, and the cell before it."""
