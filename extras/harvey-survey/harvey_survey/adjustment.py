@@ -10,17 +10,22 @@ standard deviations: each mode is normal about where the file has it. Poses are 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harvey_survey.ledger import direction_of, errors_of
-from harvey_survey.offsets import SIGMA_PX, match_again, measure_offsets, measure_slopes, measure_support
-from harvey_survey.seen_pictures import SeenPicture
+from harvey_survey.seen_pictures import (
+    SIGMA_PX,
+    SeenPicture,
+    match_again,
+    measure_offsets,
+    measure_slopes,
+    measure_support,
+)
 from knowledge_sources.methods.belief import Alike, measure_common
-from world_models.building.model_errors import LineErrors
 from world_models.building.world import World
 from world_models.camera import CAMERA_UNKNOWNS
 from world_models.frames import Pose2
@@ -98,8 +103,11 @@ class _Picture:
     modes: NDArray[np.int64]
     by_line: Floats
     alone: float
-    counts: Floats
-    weights: Floats
+    counts: Floats = field(init=False)
+    weights: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.take(self.look)
 
     @property
     def shifts(self) -> Floats:
@@ -153,18 +161,10 @@ class _Problem:
                                     for look in firsts]
         place = {way: k for k, way in enumerate(self._ways)}
         alone = [1.0 / math.fsum(measure_common(look.pose, other.pose, ALIKE) for other in looks) for look in looks]
-        self._pictures = [self._build_picture(look, errors, runs.index(look.run), place, part)
-                          for look, errors, part in zip(looks, every, alone, strict=True)]
-
-    @staticmethod
-    def _build_picture(
-        look: SeenPicture, errors: LineErrors, run: int, place: Mapping[str, int], alone: float
-    ) -> _Picture:
-        modes = np.array([place[way] for way in errors.displacement_modes], np.int64)
-        none = np.zeros(0)
-        picture = _Picture(look, look.pose, run, modes, errors.restate(1.0).displacements, alone, none, none)
-        picture.take(look)
-        return picture
+        self._pictures = [
+            _Picture(look, look.pose, runs.index(look.run), np.array([place[way] for way in errors.displacement_modes]),
+                     errors.restate(1.0).displacements, part)
+            for look, errors, part in zip(looks, every, alone, strict=True)]
 
     def solve(self) -> Adjustment:
         self._minimise(WIDTHS_PX)
@@ -253,7 +253,7 @@ class _Problem:
             own = slice(count + UNKNOWNS * run, count + UNKNOWNS * (run + 1))
             information[own, own] += known
             gradient[own] -= known @ self._cameras[run]
-        eliminated: list[tuple[_Picture, NDArray[np.int64], Floats, Floats, Floats]] = []
+        eliminated: list[tuple[_Picture, NDArray[np.int64], Floats, Floats]] = []
         for picture in self._pictures:
             lines, camera = picture.place_lines(self._offs_m), self._cameras[picture.run]
             by_state, by_place = measure_slopes(picture.look, picture.pose, camera, lines)
@@ -268,10 +268,10 @@ class _Problem:
             solved = np.linalg.solve(of_pose, np.column_stack([squares[:3, others], pull[:3]]))
             information[np.ix_(where, where)] += squares[np.ix_(others, others)] - squares[others, :3] @ solved[:, :-1]
             np.add.at(gradient, where, pull[others] - squares[others, :3] @ solved[:, -1])
-            eliminated.append((picture, where, solved[:, :-1], solved[:, -1], pull))
+            eliminated.append((picture, where, solved[:, :-1], solved[:, -1]))
         step = np.linalg.solve(information, gradient)
         self._offs_m = self._offs_m + step[:count]
         self._cameras = self._cameras + step[count:].reshape(self._cameras.shape)
-        for picture, where, slopes_of_pose, pulled, _ in eliminated:
+        for picture, where, slopes_of_pose, pulled in eliminated:
             picture.pose = Pose2(*(picture.pose.vector + pulled - slopes_of_pose @ step[where]).tolist())
         return information

@@ -8,8 +8,7 @@ two numbers a stand and one a wall and an upright, solved by reweighted least sq
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -17,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from harvey_survey.axis_view import AxisView, Bases, FloorLooks, Uprights, is_floor
+from harvey_survey.axis_view import AxisView, FloorLooks, Foot, Upright, is_floor
+from world_models.building.geometry.outlines import subtract_intervals
 from world_models.files.construction.rooms import CASING_WIDTH_M
 
 Floats = NDArray[np.float64]
@@ -38,12 +38,13 @@ MAX_SLANT = 2.5
 """Walls are read where they are seen under no larger tangent from their normal."""
 BEYOND_M, BEYOND_SHARE = (0.3, 1.0), 0.75
 """Floor so far behind a wall, in such a share, says that it is open there."""
-PROFILE_M = 0.02
+OPEN_GAP_M = 0.12
+"""Rays that see floor behind a wall no further apart along it see one opening."""
 PIECE_M, CORNER_M = 0.1, 0.35
 """Walls are read piece by piece, but for their ends."""
 DOOR_M = (0.55, 2.2)
-JAMB_M, JAMB_LOW_M, JAMB_HIGH_M = 0.16, 0.3, 1.5
-"""A doorway ends at an upright so near to where the floor behind ends, that reaches from so low to so high."""
+JAMB_LOW_M, JAMB_HIGH_M = 0.3, 1.5
+"""A doorway ends at an upright that reaches from so low to so high."""
 GAP_M, STEP_OVER_M = 0.12, 0.35
 """Of floor that is seen along a ray: what does not look like it, up to so long; and so long in a doorway."""
 LOSS_SIGMAS, LOSS_STEPS = 2.5, 5
@@ -106,10 +107,6 @@ class LearntRoom:
         """x from, y from, x to, y to."""
         return self.limit(3), self.limit(0), self.limit(1), self.limit(2)
 
-    def contains(self, point: Floats, margin_m: float = 0.0) -> bool:
-        x0, y0, x1, y1 = self.box
-        return bool(x0 + margin_m <= point[0] <= x1 - margin_m and y0 + margin_m <= point[1] <= y1 - margin_m)
-
     def span(self, side: int) -> tuple[float, float]:
         """From where to where a wall goes, along it."""
         x0, y0, x1, y1 = self.box
@@ -145,7 +142,9 @@ class AxisMap:
 
     def room_at(self, point: Floats) -> str | None:
         """The room in which a point lies."""
-        return next((name for name, room in self.rooms.items() if room.contains(point)), None)
+        boxes = {name: room.box for name, room in self.rooms.items()}
+        return next((name for name, (x0, y0, x1, y1) in boxes.items()
+                     if x0 <= point[0] <= x1 and y0 <= point[1] <= y1), None)
 
     def uprights_on(self, room: str, side: int) -> list[Key]:
         """Names of the uprights on a wall, by their place."""
@@ -181,26 +180,24 @@ class AxisMap:
         """Pair the feet of walls that a stand saw with the walls of its room, and make those that are not known yet."""
         s = self.stands[stand]
         room = self.rooms[s.room]
-        seen = [(view, view.find_bases(floors)) for view in s.views]
-        while (found := self._find_wall(room, stand, seen)) is not None:
+        feet = [foot for view in s.views for foot in view.find_feet(floors)]
+        while (found := self._find_wall(room, stand, feet)) is not None:
             self.set_wall(room, *found)
         if room.back is not None and room.walls[room.back[0]] is None:
             self.set_wall(room, *room.back)
             self._equations.append(_Equation(((("wall", room.name, room.back[0]), 1.0),), room.back[1], 0.1))
         for side in range(4):
-            self._grow_reach(room, side, stand, seen)
+            self._grow_reach(room, side, stand, feet)
         rooms = [room, *(self.rooms[name] for name in self._beside(room.name))]
-        for view, bases in seen:
-            for k in range(len(bases.side)):
-                any(self._pair_base(one, stand, view, bases, k, one is room) for one in rooms)
+        for foot in feet:
+            any(self._pair_foot(one, stand, foot, one is room) for one in rooms)
         self.solve()
 
     def read_through(self, stand: int, room: str, floors: Sequence[FloorLooks]) -> None:
         """Pair the feet of walls that a stand saw through a doorway with those of the room behind, known since."""
         for view in self.stands[stand].views:
-            bases = view.find_bases(floors)
-            for k in range(len(bases.side)):
-                self._pair_base(self.rooms[room], stand, view, bases, k, False)
+            for foot in view.find_feet(floors):
+                self._pair_foot(self.rooms[room], stand, foot, False)
         self.solve()
 
     def _beside(self, room: str) -> list[str]:
@@ -208,26 +205,18 @@ class AxisMap:
         found = [door.behind for door in self.doors if door.room == room and door.behind is not None]
         return [*found, *(door.room for door in self.doors if door.behind == room)]
 
-    def _pair_base(
-        self, room: LearntRoom, stand: int, view: AxisView, bases: Bases, k: int, is_own: bool
-    ) -> bool:
-        side = int(bases.side[k])
-        axis, wall = ACROSS[side], room.walls[side]
+    def _pair_foot(self, room: LearntRoom, stand: int, foot: Foot, is_own: bool) -> bool:
+        axis, wall = ACROSS[foot.side], room.walls[foot.side]
         here = self.position(stand)
         if wall is None:
             return False
-        near = SAME_WALL_M if is_own else SAME_FAR_WALL_M + 2.0 * float(
-            bases.sigma_m[k] + abs(self.sigmas["stand", stand, axis] - self.sigmas.get(("wall", room.name, side), 0.0)))
-        if abs(here[axis] + view.forward_m[axis] + bases.offset_m[k] - wall) > near:
+        near = SAME_WALL_M if is_own else SAME_FAR_WALL_M + 2.0 * (foot.sigma_m + abs(
+            self.sigmas["stand", stand, axis] - self.sigmas.get(("wall", room.name, foot.side), 0.0)))
+        (low, high), ends = room.span(foot.side), (here[1 - axis] + foot.low_m, here[1 - axis] + foot.high_m)
+        first, last = ends if is_own else ends[::-1]  # of its own wall a part, of another the whole
+        if abs(here[axis] + foot.off_m - wall) > near or last < low - 0.1 or first > high + 0.1:
             return False
-        low, high = room.span(side)
-        along = bases.along_m[k] + here[1 - axis] + view.forward_m[1 - axis]
-        if is_own and (along[1] < low - 0.1 or along[0] > high + 0.1):
-            return False
-        if not is_own and (along[0] < low - 0.1 or along[1] > high + 0.1):
-            return False
-        off = float(bases.offset_m[k] + view.forward_m[axis])
-        self.measure_wall(stand, room.name, side, off, float(bases.sigma_m[k]))
+        self.measure_wall(stand, room.name, foot.side, foot.off_m, foot.sigma_m)
         return True
 
     def measure_wall(self, stand: int, room: str, side: int, off_m: float, sigma_m: float) -> None:
@@ -236,26 +225,21 @@ class AxisMap:
             (("wall", room, side), 1.0), (("stand", stand, ACROSS[side]), -1.0))
         self._equations.append(_Equation(terms, off_m, sigma_m))
 
-    def _grow_reach(
-        self, room: LearntRoom, side: int, stand: int, seen: Sequence[tuple[AxisView, Bases]]
-    ) -> None:
+    def _grow_reach(self, room: LearntRoom, side: int, stand: int, feet: Sequence[Foot]) -> None:
         """How far the walls beside are seen in a direction: where no wall ends the room yet, it goes so far."""
         axis, sign = ACROSS[side], SIGN[side]
         here = self.position(stand)
         far = [here[axis] + sign * 0.5]
-        for view, bases in seen:
-            for k in np.flatnonzero(bases.side % 2 != side % 2):
-                wall = room.walls[int(bases.side[k])]
-                at = here[1 - axis] + view.forward_m[1 - axis] + bases.offset_m[k]
-                if wall is not None and abs(at - wall) < SAME_WALL_M:
-                    far.extend((bases.along_m[k] + here[axis] + view.forward_m[axis]).tolist())
+        for foot in feet:
+            wall = room.walls[foot.side]
+            if foot.side % 2 != side % 2 and wall is not None and (
+                    abs(here[1 - axis] + foot.off_m - wall) < SAME_WALL_M):
+                far += [here[axis] + foot.low_m, here[axis] + foot.high_m]
         best = max(far, key=lambda m: sign * m)
         known = room.reach[side]
         room.reach[side] = best if known == 0.0 or sign * best > sign * known else known
 
-    def _find_wall(
-        self, room: LearntRoom, stand: int, seen: Sequence[tuple[AxisView, Bases]]
-    ) -> tuple[int, float] | None:
+    def _find_wall(self, room: LearntRoom, stand: int, feet: Sequence[Foot]) -> tuple[int, float] | None:
         """Of the sides where no wall is known, that of whose wall most is seen, between the walls that are known."""
         here = self.position(stand)
         best, most = None, 0.0
@@ -265,20 +249,20 @@ class AxisMap:
             low = -math.inf if ends[0] is None else ends[0] - 0.1
             high = math.inf if ends[1] is None else ends[1] + 0.1
             rows = []
-            for view, bases in seen:
-                for k in np.flatnonzero(bases.side == side):
-                    along = bases.along_m[k] + here[1 - axis] + view.forward_m[1 - axis]
-                    at = float(here[axis] + view.forward_m[axis] + bases.offset_m[k])
-                    if room.back is not None and room.back[0] == side and abs(at - room.back[1]) > BEHIND_WALL_M:
-                        continue
-                    if low <= along[0] and along[1] <= high and sign * (at - here[axis]) > 0.0:
-                        rows.append((at, tuple(along.tolist())))
+            for foot in (foot for foot in feet if foot.side == side):
+                along = float(here[1 - axis]) + foot.low_m, float(here[1 - axis]) + foot.high_m
+                at = float(here[axis]) + foot.off_m
+                if room.back is not None and room.back[0] == side and abs(at - room.back[1]) > BEHIND_WALL_M:
+                    continue
+                if low <= along[0] and along[1] <= high and sign * foot.off_m > 0.0:
+                    rows.append((at, along))
             for offset, _ in rows:
                 near = [(at, along) for at, along in rows if abs(at - offset) < 0.04]
                 if _measure_union([along for _, along in near]) < MIN_WALL_M:
                     continue
                 away, middle = abs(offset - here[axis]), here[1 - axis]  # what is far and long is seen as short
-                covered = _measure_union([tuple(math.atan2(end - middle, away) for end in along) for _, along in near])
+                bearings = [np.arctan2(np.array(along) - middle, away).tolist() for _, along in near]
+                covered = _measure_union([(first, last) for first, last in bearings])
                 if covered > most:
                     best, most = (side, float(np.median([at for at, _ in near]))), covered
         return best
@@ -292,17 +276,14 @@ class AxisMap:
         """Pair the uprights that a stand saw with those on its room's walls, and make those that are not known yet."""
         s = self.stands[stand]
         room = self.rooms[s.room]
-        found = []
-        for view in s.views:
-            eye = self.position(stand) + view.forward_m
-            found += [(view, view.uprights, k, side, along, slant, far)
-                      for k in range(len(view.uprights.bearing_rad))
-                      for side, along, slant, far in [meet_wall(room, eye, float(view.uprights.bearing_rad[k]))]
-                      if side >= 0 and abs(slant) < MAX_SLANT and room.walls[side] is not None]
-        shift = [self._find_shift(room.name, [(f[3], f[4]) for f in found if ACROSS[f[3]] != axis],
+        met = [(view, upright, meet_wall(room, self.position(stand) + view.forward_m, upright.bearing_rad))
+               for view in s.views for upright in view.uprights]
+        found = [(view, upright, *wall) for view, upright, wall in met
+                 if wall[0] >= 0 and abs(wall[2]) < MAX_SLANT and room.walls[wall[0]] is not None]
+        shift = [self._find_shift(room.name, [(side, along) for _, _, side, along, *_ in found if ACROSS[side] != axis],
                                   self.sigmas["stand", stand, axis]) for axis in (0, 1)]
-        for view, uprights, k, side, along, slant, far in found:
-            self._pair_upright(room, stand, view, uprights, k, side, along + shift[1 - ACROSS[side]], slant, far)
+        for view, upright, side, along, slant, far in found:
+            self._pair_upright(room, stand, view, upright, side, along + shift[1 - ACROSS[side]], slant, far)
         self.solve()
 
     def _find_shift(self, room: str, places: Sequence[tuple[int, float]], sigma_m: float) -> float:
@@ -323,8 +304,8 @@ class AxisMap:
         return best
 
     def _pair_upright(
-        self, room: LearntRoom, stand: int, view: AxisView, uprights: Uprights, k: int, side: int, along: float,
-        slant: float, far: float,
+        self, room: LearntRoom, stand: int, view: AxisView, upright: Upright, side: int, along: float, slant: float,
+        far: float,
     ) -> None:
         low, high = room.span(side)
         if not low + 0.04 < along < high - 0.04 or any(
@@ -332,8 +313,7 @@ class AxisMap:
                 for door in self.doors):
             return
         axis = ACROSS[side]
-        height = view.mount.height_m
-        ends = height + far * float(uprights.slope[k, 0]), height + far * float(uprights.slope[k, 1])
+        ends = view.mount.height_m + far * upright.lower, view.mount.height_m + far * upright.upper
         near = [key for key in self.uprights_on(room.name, side) if abs(self.values[key] - along) < SAME_UPRIGHT_M]
         if near:
             key = min(near, key=lambda one: abs(self.values[one] - along))
@@ -347,42 +327,32 @@ class AxisMap:
         terms: tuple[tuple[Key, float], ...] = (
             (key, 1.0), (("stand", stand, 1 - axis), -1.0), (("wall", room.name, side), -slant),
             (("stand", stand, axis), slant))
-        sigma = math.hypot(far * math.hypot(1.0, slant) * float(uprights.sigma_rad[k]), 0.004)
+        sigma = math.hypot(far * math.hypot(1.0, slant) * upright.sigma_rad, 0.004)
         self._equations.append(_Equation(terms, float(forward[1 - axis] - slant * forward[axis]), sigma))
 
     # -- all together ----------------------------------------------------------------------------------------------
 
     def solve(self) -> None:
         """Find all unknowns by all equations, with a loss that forgets wrong pairs; take walls over into the rooms."""
-        seen = Counter(equation.terms[0][0] for equation in self._equations)
-        once = [e for e in self._equations if e.terms[0][0][0] == "upright" and seen[e.terms[0][0]] == 1]
-        alone = {e.terms[0][0] for e in once}
-        equations = [e for e in self._equations if e.terms[0][0] not in alone]
-        names = [name for name in self.values if name not in alone and name[0] != "upright"]
-        marks = [name for name in self.values if name not in alone and name[0] == "upright"]
-        index = {name: i for i, name in enumerate([*names, *marks])}
-        rows = [(r, index[name], factor) for r, e in enumerate(equations) for name, factor in e.terms]
+        index = {name: i for i, name in enumerate(sorted(self.values, key=lambda name: name[0] == "upright"))}
+        few = sum(name[0] != "upright" for name in index)
+        rows = [(r, index[name], factor) for r, e in enumerate(self._equations) for name, factor in e.terms]
         slopes = csr_array(([f for *_, f in rows], ([r for r, *_ in rows], [i for _, i, _ in rows])),
-                           shape=(len(equations), len(index))).tocsc()
-        few = len(names)
-        value, sigma = (np.array(part) for part in zip(*((e.value, e.sigma) for e in equations), strict=True))
+                           shape=(len(self._equations), len(index))).tocsc()
+        value, sigma = np.array([(e.value, e.sigma) for e in self._equations]).T
         state = np.array([self.values[name] for name in index])
         for _ in range(LOSS_STEPS):
             left = value - slopes @ state
             weight = 1.0 / (1.0 + (left / sigma / LOSS_SIGMAS) ** 2) / sigma**2
-            squares, pull = slopes.T @ (slopes * weight[:, None]), slopes.T @ (weight * left)
+            squares, pull = (slopes.T @ (slopes * weight[:, None])).tocsr(), slopes.T @ (weight * left)
             own = squares.diagonal()[few:]  # uprights are eliminated, each alone
-            joined = squares.tocsr()[few:, :few].toarray() / own[:, None]
-            reduced = squares.tocsr()[:few, :few].toarray() - joined.T @ (own[:, None] * joined) + 1e-9 * np.eye(few)
+            joined = squares[few:, :few].toarray() / own[:, None]
+            reduced = squares[:few, :few].toarray() - joined.T @ (own[:, None] * joined) + 1e-9 * np.eye(few)
             covariance = np.linalg.inv(reduced)
             step = covariance @ (pull[:few] - joined.T @ pull[few:])
             state = state + np.concatenate([step, pull[few:] / own - joined @ step])
-        variances = [covariance.diagonal(), 1.0 / own + np.sum((joined @ covariance) * joined, axis=1)]
         self.values.update(zip(index, state.tolist(), strict=True))
-        self.sigmas.update(zip(index, np.sqrt(np.concatenate(variances)).tolist(), strict=True))
-        for e in once:  # what was seen once tells nothing of the rest
-            self.values[e.terms[0][0]] = e.value - math.fsum(f * self.values[name] for name, f in e.terms[1:])
-            self.sigmas[e.terms[0][0]] = e.sigma
+        self.sigmas.update(zip(list(index)[:few], np.sqrt(covariance.diagonal()).tolist(), strict=True))
         for room in self.rooms.values():
             room.walls = [self.values.get(("wall", room.name, side)) for side in range(4)]
 
@@ -395,21 +365,25 @@ class AxisMap:
         key = (len(floors), *np.round(room.box, 2), *np.round(self.position(stand), 2))
         if self._open.get(stand, (None, []))[0] == key:
             return self._open[stand][1]
-        found: list[tuple[int, float, bool]] = []
+        found = [(side, along, bool(is_floor(looks, floors).mean() >= BEYOND_SHARE))
+                 for side, along, looks, _ in self._look_behind(stand, MAX_SLANT) if len(looks) >= 4]
         self._open[stand] = key, found
-        for view in s.views:
+        return found
+
+    def _look_behind(self, stand: int, max_slant: float) -> Iterator[tuple[int, float, Floats, Floats]]:
+        """Of each ray that meets a wall of the stand's room: side, where along it, and the looks (n, 3) of what would
+        be floor just behind it, and further."""
+        room = self.rooms[self.stands[stand].room]
+        for view in self.stands[stand].views:
             eye = self.position(stand) + view.forward_m
-            like, known = is_floor(view.polar, floors), np.isfinite(view.polar[..., 0])
+            known = np.isfinite(view.polar[..., 0])
             for i, bearing in enumerate(view.bearings.tolist()):
                 side, along, slant, far = meet_wall(room, eye, bearing)
-                if side < 0 or room.walls[side] is None or abs(slant) > MAX_SLANT:
-                    continue
-                near = abs(room.limit(side) - eye[ACROSS[side]])
-                window = [far * (near + m) / near for m in BEYOND_M]
-                rows = known[i] & (view.distances_m >= window[0]) & (view.distances_m <= window[1])
-                if np.count_nonzero(rows) >= 4:
-                    found.append((side, along, bool(like[i, rows].mean() >= BEYOND_SHARE)))
-        return found
+                if side >= 0 and room.walls[side] is not None and abs(slant) <= max_slant:
+                    near = abs(room.limit(side) - eye[ACROSS[side]])
+                    first, last = (far * (near + m) / near for m in BEYOND_M)
+                    rows = known[i] & (view.distances_m >= first) & (view.distances_m <= last)
+                    yield side, along, view.polar[i, rows], view.polar[i, known[i] & (view.distances_m > last)]
 
     def _rays_of(self, room: str, floors: Sequence[FloorLooks]) -> list[tuple[int, float, bool]]:
         return [ray for n, stand in enumerate(self.stands) if stand.room == room for ray in self.see_open(n, floors)]
@@ -422,13 +396,8 @@ class AxisMap:
         for side in (side for side in range(4) if room.walls[side] is not None):
             low, high = room.span(side)
             places = np.arange(low + CORNER_M, high - CORNER_M, PIECE_M)
-            read = np.sort([along for s, along, _ in rays if s == side])
-            if not len(read):
-                unread += [(side, float(at)) for at in places]
-                continue
-            k = np.searchsorted(read, places)
-            after, before = read[np.minimum(k, len(read) - 1)], read[np.maximum(k - 1, 0)]
-            away = np.minimum(np.abs(after - places), np.abs(before - places))
+            read = [along for met, along, _ in rays if met == side]
+            away = np.abs(np.subtract.outer(places, read)).min(axis=1, initial=math.inf)
             unread += [(side, float(at)) for at in places[away > PIECE_M]]
         return unread
 
@@ -439,52 +408,34 @@ class AxisMap:
         doors = []
         for side in range(4):
             low, high = room.span(side)
-            count = max(1, math.ceil((high - low) / PROFILE_M))
-            yes = np.zeros(count, int)
-            for _, along, is_open in (ray for ray in rays if ray[0] == side):
-                k = int((along - low) / PROFILE_M)
-                if 0 <= k < count and is_open:
-                    yes[k] += 1
-            for a, b in _find_runs(yes > 0, 5):
-                ends = low + a * PROFILE_M, low + b * PROFILE_M
-                if ends[1] - ends[0] < 0.25:
+            read = np.sort([along for met, along, is_open in rays if met == side and is_open and low <= along <= high])
+            for part in np.split(read, np.flatnonzero(np.diff(read) > OPEN_GAP_M) + 1):
+                if not len(part) or part[-1] - part[0] < 0.25:
                     continue
-                snapped = self._snap(room_name, side, ends)
+                snapped = self._snap(room_name, side, (float(part[0]), float(part[-1])))
                 if snapped is not None and DOOR_M[0] < snapped[1] - snapped[0] < DOOR_M[1]:
                     doors.append((side, *snapped))
         return doors
 
     def find_gaps(self, room: str, side: int) -> list[tuple[float, float]]:
         """Pairs of neighbouring tall uprights as far apart as the jambs of a doorway."""
-        tall = [self.values[key] for key in self.uprights_on(room, side)
+        return [(a, b) for a, b in pairwise(self._find_tall(room, side)) if DOOR_M[0] < b - a < DOOR_M[1]]
+
+    def _find_tall(self, room: str, side: int) -> list[float]:
+        """Where uprights are that may be jambs."""
+        return [self.values[key] for key in self.uprights_on(room, side)
                 if self.upright_ends[key][0] < JAMB_LOW_M and self.upright_ends[key][1] > JAMB_HIGH_M]
-        return [(a, b) for a, b in pairwise(tall) if DOOR_M[0] < b - a < DOOR_M[1]]
 
     def looks_behind(self, stand: int, side: int, low_m: float, high_m: float) -> Floats | None:
         """Looks (n, 3) of what may be floor behind a wall, between two uprights; None where it cannot be.
 
         It is alike all over, is not what is seen beside the uprights, and ends below the horizon.
         """
-        s = self.stands[stand]
-        room = self.rooms[s.room]
-        inside: list[Floats] = []
-        outside: list[Floats] = []
-        rest: list[Floats] = []
-        for view in s.views:
-            eye = self.position(stand) + view.forward_m
-            known = np.isfinite(view.polar[..., 0])
-            for i, bearing in enumerate(view.bearings.tolist()):
-                met, along, slant, far = meet_wall(room, eye, bearing)
-                if met != side or room.walls[side] is None or abs(slant) > 1.5:
-                    continue
-                near = abs(room.limit(side) - eye[ACROSS[side]])
-                window = [far * (near + m) / near for m in BEYOND_M]
-                rows = known[i] & (view.distances_m >= window[0]) & (view.distances_m <= window[1])
-                if low_m + 0.15 < along < high_m - 0.15:
-                    inside.append(view.polar[i, rows])
-                    rest.append(view.polar[i, known[i] & (view.distances_m > window[1])])
-                elif low_m - 0.6 < along < low_m - 0.15 or high_m + 0.15 < along < high_m + 0.6:
-                    outside.append(view.polar[i, rows])
+        rays = [ray[1:] for ray in self._look_behind(stand, 1.5) if ray[0] == side]
+        inside = [behind for along, behind, _ in rays if low_m + 0.15 < along < high_m - 0.15]
+        rest = [further for along, _, further in rays if low_m + 0.15 < along < high_m - 0.15]
+        outside = [behind for along, behind, _ in rays
+                   if low_m - 0.6 < along < low_m - 0.15 or high_m + 0.15 < along < high_m + 0.6]
         if len(inside) < 5 or not outside or sum(map(len, outside)) < 20 or sum(map(len, inside)) < 200:
             return None
         looks = np.concatenate(inside)
@@ -497,8 +448,7 @@ class AxisMap:
 
     def _snap(self, room: str, side: int, ends: tuple[float, float]) -> tuple[float, float] | None:
         """Where a doorway ends, by the tall uprights outside of where floor is seen behind: the boards round it."""
-        tall = [self.values[key] for key in self.uprights_on(room, side)
-                if self.upright_ends[key][0] < JAMB_LOW_M and self.upright_ends[key][1] > JAMB_HIGH_M]
+        tall = self._find_tall(room, side)
         left = [x for x in tall if ends[0] - 0.4 < x < ends[0] + 0.06]
         right = [x for x in tall if ends[1] - 0.06 < x < ends[1] + 0.4]
         if not left or not right:
@@ -568,20 +518,6 @@ def _run_of_floor(distances_m: Floats, like: Mask, known: Mask, walls_m: Floats,
     return np.asarray(np.where(through, reach, np.minimum(reach, walls_m)))
 
 
-def _measure_union(intervals: Sequence[tuple[float, ...]]) -> float:
-    total, end = 0.0, -math.inf
-    for low, high in sorted(intervals):
-        total += max(0.0, high - max(low, end))
-        end = max(end, high)
-    return total
-
-
-def _find_runs(mask: Mask, gap: int) -> list[tuple[int, int]]:
-    """From where to where a mask is true, over gaps up to ``gap``."""
-    runs: list[list[int]] = []
-    for i in np.flatnonzero(mask).tolist():
-        if runs and i - runs[-1][1] <= gap:
-            runs[-1][1] = i + 1
-        else:
-            runs.append([i, i + 1])
-    return [(a, b) for a, b in runs]
+def _measure_union(intervals: Sequence[tuple[float, float]]) -> float:
+    ends = min(low for low, _ in intervals), max(high for _, high in intervals)
+    return ends[1] - ends[0] - math.fsum(b - a for a, b in subtract_intervals(ends, intervals, 0.0))

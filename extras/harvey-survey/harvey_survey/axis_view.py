@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -65,33 +66,33 @@ def is_floor(appearance: Floats, floors: Sequence[FloorLooks]) -> Mask:
     return found
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Bases:
-    """Feet of walls: lines of the floor along an axis, floor before them and none behind.
+class Foot(NamedTuple):
+    """The foot of a wall: a line of the floor along an axis, floor before it and none behind.
 
     Attributes:
-        side: (n,) 0 south, 1 east, 2 north, 3 west of the camera.
-        offset_m, sigma_m: (n,) from the camera across the line: y of south and north, x of east and west.
-        along_m: (n, 2) from where to where the line is seen, along it.
+        side: 0 south, 1 east, 2 north, 3 west of the camera.
+        off_m, sigma_m: from the robot across the line: y of south and north, x of east and west.
+        low_m, high_m: from where to where the line is seen, along it, from the robot.
     """
 
-    side: NDArray[np.int64]
-    offset_m: Floats
-    sigma_m: Floats
-    along_m: Floats
+    side: int
+    off_m: float
+    sigma_m: float
+    low_m: float
+    high_m: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Uprights:
-    """Upright lines: directions [rad, axes' frame] with deviations, and slopes (m, 2) of their lower and upper end.
+class Upright(NamedTuple):
+    """An upright line: its direction [rad, axes' frame] with its deviation, and slopes of its lower and upper end.
 
-    At a distance of d they reach from ``height + d * slope[0]`` to ``height + d * slope[1]``; an end at the border of
-    the picture is cut: infinite.
+    At a distance of d it reaches from ``height + d * lower`` to ``height + d * upper``; an end at the border of the
+    picture is cut: infinite.
     """
 
-    bearing_rad: Floats
-    sigma_rad: Floats
-    slope: Floats
+    bearing_rad: float
+    sigma_rad: float
+    lower: float
+    upper: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,22 +140,17 @@ class AxisView:
 
     def colours_at(self, points: Floats) -> tuple[Floats, Mask]:
         """Colours (..., 3) at points (..., 3) [m, axes' frame from the camera's foot], and which are in the picture."""
-        pixels, ahead = self.project(points)
+        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        x, y = points[..., 0] * c + points[..., 1] * s, points[..., 1] * c - points[..., 0] * s
+        seen = self.mount.camera_from_robot.apply(np.stack([x + self.mount.forward_m, y, points[..., 2]], axis=-1))
+        ahead = seen[..., 2] > 0.1
+        pixels = self.camera.project(np.where(ahead[..., None], seen, [0.0, 0.0, 1.0]))
         inside = ahead & self.camera.inside(pixels, 1.0)
         u, v = (np.where(inside, pixels[..., k], 0.0).astype(np.float32) for k in (0, 1))
         flat = cv2.remap(self.picture, u.reshape(u.shape[0], -1), v.reshape(u.shape[0], -1), cv2.INTER_LINEAR)
         return flat.reshape(*u.shape, 3).astype(float), inside
 
-    def project(self, points: Floats) -> tuple[Floats, Mask]:
-        """Pixels (..., 2) of points (..., 3) [m, axes' frame from the camera's foot], and which are before it."""
-        c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        x, y = points[..., 0] * c + points[..., 1] * s, points[..., 1] * c - points[..., 0] * s
-        robot = np.stack([x + self.mount.forward_m, y, points[..., 2]], axis=-1)
-        seen = self.mount.camera_from_robot.apply(robot)
-        ahead = seen[..., 2] > 0.1
-        return self.camera.project(np.where(ahead[..., None], seen, [0.0, 0.0, 1.0])), ahead
-
-    def find_bases(self, floors: Sequence[FloorLooks]) -> Bases:
+    def find_feet(self, floors: Sequence[FloorLooks]) -> list[Foot]:
         """Feet of walls where floors look so."""
         lines = self.lines.take(self.lines.lengths_px >= MIN_BASE_PX)
         ends = _to_floor(lines.segments_px, self)
@@ -173,8 +169,9 @@ class AxisView:
         shifted = _to_floor(_shift(lines.segments_px[rows], lines.sigma_offset_px[rows]), self).mean(axis=1)
         sigma = np.hypot(shifted[pick, across] - offset, self.sigma_rad * np.abs(middle[pick, 1 - across]))
         side = np.where(across == 1, np.where(offset > 0.0, 2, 0), np.where(offset > 0.0, 1, 3))
-        along = np.sort(ends[pick, :, 1 - across], axis=1)
-        return Bases(side.astype(np.int64), offset, np.hypot(sigma, 0.003), along)
+        low, high = np.sort(ends[pick, :, 1 - across], axis=1).T + self.forward_m[1 - across]
+        parts = (side, offset + self.forward_m[across], np.hypot(sigma, 0.003), low, high)
+        return [Foot(*foot) for foot in zip(*(part.tolist() for part in parts), strict=True)]
 
     def _floor_angle_sigma(self, lines: LineSegments) -> Floats:
         """(n,) deviation of a segment's direction on the floor [rad]."""
@@ -201,7 +198,7 @@ class AxisView:
         return bool(below >= MIN_FLOOR and above <= MAX_FLOOR)
 
     @cached_property
-    def uprights(self) -> Uprights:
+    def uprights(self) -> list[Upright]:
         """The upright lines."""
         lines = self.lines.take(self.lines.lengths_px >= MIN_UPRIGHT_PX)
         rays = _robot_rays(lines.segments_px, self.camera, self.mount)
@@ -218,7 +215,8 @@ class AxisView:
         v = np.sort(lines.segments_px[..., 1], axis=1)  # the picture's upper border is the upper end
         slope[v[:, 1] > self.camera.height - 4.0, 0] = -np.inf
         slope[v[:, 0] < 3.0, 1] = np.inf
-        return Uprights(bearing + self.heading_rad, np.hypot(sigma, self.sigma_rad), slope)
+        rows = np.column_stack([bearing + self.heading_rad, np.hypot(sigma, self.sigma_rad), slope])
+        return [Upright(*row) for row in zip(*rows.T.tolist(), strict=True)]
 
 
 def see_axes(jpeg: bytes, camera: Camera, mount: CameraMount, heading_rad: float) -> AxisView | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,16 +17,23 @@ if TYPE_CHECKING:
     from sim.stage import Stage
 
 
-def build_explored_stage(world: Path, room: str, at_m: tuple[float, float], heading_deg: float) -> Stage:
-    """The simulator's building with a robot put down at a place [m, the room's frame]. Raises BadInput."""
-    from sim.scenario import ScenarioError, parse_scenario
-    from sim.stage import build_stage
+def format_explored(world: Path, ends: Sequence[tuple[str, float, float]], heading_deg: float) -> str:
+    """A scenario from one place to another: room, x and y [m, the room's frame]."""
     from world_models.units import FOOT_M
 
-    place = f"({room} ({at_m[0] / FOOT_M:.5f},{at_m[1] / FOOT_M:.5f},0))"
-    text = f'world = "{world.resolve()}"\ngoal = "(ptrans {place} {place})"\n[start]\nheading_deg = {heading_deg:.4f}\n'
+    goal = " ".join(f"({room} ({x / FOOT_M:.5f},{y / FOOT_M:.5f},0))" for room, x, y in ends)
+    return f'world = "{world.resolve()}"\ngoal = "(ptrans {goal})"\n[start]\nheading_deg = {heading_deg:.4f}\n'
+
+
+def build_explored_stage(
+    world: Path, ends: Sequence[tuple[str, float, float]], heading_deg: float, more: str = ""
+) -> Stage:
+    """The simulator's building with a robot put down at the first of two places. Raises BadInput."""
+    from sim.scenario import ScenarioError, parse_scenario
+    from sim.stage import build_stage
+
     try:
-        return build_stage(parse_scenario(text, "explore", world.parent))
+        return build_stage(parse_scenario(format_explored(world, ends, heading_deg) + more, "explore", world.parent))
     except (ScenarioError, ValueError) as error:
         raise BadInput(str(error)) from None
 
@@ -65,8 +73,8 @@ def _run(args: Namespace) -> int:
     if args.start not in world.rooms:
         raise BadInput(f"--start: expected a room of {args.world}: {', '.join(world.rooms)}, got {args.start!r}")
     outline = world.locale(args.start).outline
-    middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
-    stage = build_explored_stage(find_file(args.world), args.start, tuple(args.at or middle.tolist()), args.heading)
+    x_m, y_m = args.at or (0.5 * (outline.min(axis=0) + outline.max(axis=0))).tolist()
+    stage = build_explored_stage(find_file(args.world), [(args.start, x_m, y_m)] * 2, args.heading)
     body = stage.body(args.seed)
     explorer = build_explorer(stage, body, tell_steps=True)
     stopped = ""

@@ -7,43 +7,150 @@ of it, in the building as it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from experiments.generated.floor_plan import as_toml
+from experiments.generated.floors import generated_floor
 from experiments.report import Report
 from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
 from harvey.agent import build_agent
 from harvey.runner.result import MissionResult
 from harvey.simulation.simulated_run import SimulatedRun, build_head
-from harvey_survey.explore_command import build_explored_stage, build_explorer
-from harvey_survey.explore_floors import (
-    Likeness,
-    compare_models,
-    lay_into_world,
-    match_rooms,
-    sample_floor,
-    write_bare_floor,
-)
+from harvey_survey.explore_command import build_explored_stage, build_explorer, format_explored
 from harvey_survey.explorer import ExploringStopped
 from harvey_survey.learnt_world import write_learnt_world
 from harvey_survey.seen_floor import cell_of
 from logs.run_recorder import RunRecorder
 from sim.scenario import parse_scenario
-from sim.stage import build_stage
 from world_models.building.world import World
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2
-from world_models.units import FOOT_M
+
+Floats = NDArray[np.float64]
+
+STANDING = ("desk", "bookshelf", "file-cabinet", "cupboard", "rack", "table")
+"""What stands on the floor, and is left out."""
+SAME_ROOM, SAME_DOOR_M, SAME_CORNER_M = 0.7, 0.3, 0.1
+"""A room is found whose outline shares so much with the true one, a doorway whose middle is so near, a corner."""
+
+
+def write_bare_floor(folder: Path, seed: int, rooms: int) -> Path:
+    """Write a floor with so many rooms along corridors; returns the world file."""
+    data = tomllib.loads(generated_floor(seed, rooms, open_share=1.0, clutter=0.0).text)
+    for locale in data["locales"].values():
+        if "things" in locale:
+            locale["things"] = [thing for thing in locale["things"] if thing["part"] not in STANDING]
+    path = folder / f"bare-{seed}.toml"
+    path.write_text(as_toml(data), "utf-8")
+    return path
+
+
+def lay_into_world(learnt: Path, start: Pose2, start_rad: float) -> Path:
+    """Write the model in the world's frame; ``start_rad`` is the robot's heading at the start, in the model's."""
+    x, y = start.x_m, start.y_m
+    path = learnt.with_name(f"{learnt.stem}-in-world.toml")
+    path.write_text(f'name = "{learnt.stem}"\nunits = "metres"\n[locales.explored]\nkind = "building"\n'
+                    f'from = "{learnt.name}"\nat = [{x:.5f}, {y:.5f}]\n'
+                    f"turn = {math.degrees(start.heading_rad - start_rad):.5f}\n", "utf-8")
+    return path
+
+
+@dataclass(frozen=True, slots=True)
+class Likeness:
+    """How like the truth a model is.
+
+    Attributes:
+        rooms, found_rooms, false_rooms; doors, found_doors, false_doors: how many.
+        walls_m: how far each wall of a room that was found is off, along its normal; angle_deg: of the axes.
+        own_right, own_corners; true_found, true_corners: of the model's corners how many are near a true one, and of
+            the true ones how many near one of the model's.
+    """
+
+    rooms: int
+    found_rooms: int
+    false_rooms: int
+    doors: int
+    found_doors: int
+    false_doors: int
+    walls_m: list[float]
+    angle_deg: float
+    own_right: int
+    own_corners: int
+    true_found: int
+    true_corners: int
+
+
+def compare_models(true: World, learnt: World) -> Likeness:
+    """A model, in the world's frame, beside the truth."""
+    pairs = match_rooms(true, learnt)
+    walls = [off for name, own in pairs.items() for off in _measure_walls(true.outline(name), learnt.outline(own))]
+    first, second = learnt.outline(learnt.rooms[0])[:2]
+    angle = math.degrees(math.atan2(*(second - first)[::-1]))
+    true_corners = np.concatenate([true.outline(name) for name in true.rooms])
+    own_corners = np.concatenate([learnt.outline(name) for name in learnt.rooms])
+    doors = [door.centre_world for door in true.doorways]
+    own_doors = [door.centre_world for door in learnt.doorways]
+    found = sum(_near(door, own_doors, SAME_DOOR_M) for door in doors)
+    false = sum(not _near(door, doors, SAME_DOOR_M) for door in own_doors)
+    return Likeness(
+        len(true.rooms), len(pairs), len(learnt.rooms) - len(pairs), len(doors), found, false, walls,
+        abs(math.remainder(angle, 90.0)),
+        sum(_near(corner, true_corners, SAME_CORNER_M) for corner in own_corners), len(own_corners),
+        sum(_near(corner, own_corners, SAME_CORNER_M) for corner in true_corners), len(true_corners))
+
+
+def match_rooms(true: World, learnt: World) -> dict[str, str]:
+    """Each true room that was found, with its name in the model."""
+    pairs = {}
+    for name in true.rooms:
+        shares = {own: _share(true.outline(name), learnt.outline(own)) for own in learnt.rooms}
+        best = max(shares, key=lambda own: shares[own], default="")
+        if best and shares[best] >= SAME_ROOM:
+            pairs[name] = best
+    return pairs
+
+
+def sample_floor(true: World, step_m: float = 0.1, margin_m: float = 0.1) -> Floats:
+    """(n, 2) points of the floor of all rooms [m, world]."""
+    points = []
+    for name in true.rooms:
+        low, high = true.outline(name).min(axis=0) + margin_m, true.outline(name).max(axis=0) - margin_m
+        x, y = np.arange(low[0], high[0], step_m), np.arange(low[1], high[1], step_m)
+        points.append(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
+    return np.concatenate(points)
+
+
+def _share(one: Floats, other: Floats) -> float:
+    """Intersection over union of the boxes round two outlines."""
+    low = np.maximum(one.min(axis=0), other.min(axis=0))
+    high = np.minimum(one.max(axis=0), other.max(axis=0))
+    both = float(np.prod(np.maximum(high - low, 0.0)))
+    area = float(np.prod(np.ptp(one, axis=0)) + np.prod(np.ptp(other, axis=0)))
+    return both / (area - both)
+
+
+def _measure_walls(true: Floats, own: Floats) -> list[float]:
+    ends = np.stack([true.min(axis=0), true.max(axis=0)]) - np.stack([own.min(axis=0), own.max(axis=0)])
+    return [float(end) for end in np.abs(ends).ravel()]
+
+
+def _near(point: Floats, others: Sequence[Floats] | Floats, within_m: float) -> bool:
+    return len(others) > 0 and float(np.linalg.norm(np.asarray(others) - point, axis=1).min()) <= within_m
+
 
 FLOORS, MISSIONS = 20, 10
 QUICK_FLOORS, QUICK_MISSIONS = 1, 3
 ROOMS = (4, 10)
 FIRST_SEED = 610_000
 """The floors of seeds 7001, 7009 and 600000 are those by which the explorer was made."""
+PUT_DOWN = "put_down_sigma_m = 0.02\nput_down_sigma_deg = 1.0\n"
 MARGIN_M = 0.8
 """Start and goal are so far from the walls."""
 NEAR_M, WALL_M, ANGLE_DEG, HOME_M, SOFT_M_PER_S = 0.05, 0.03, 1.0, 0.1, 0.1
@@ -60,12 +167,11 @@ class ExploreCase:
 
 
 @dataclass(frozen=True, slots=True)
-class Explored:
+class Explored(Likeness):
     """How an exploration ended, and the missions after it.
 
     Attributes:
         stopped: why it stopped; "": it came home. home_m: how far from the start it truly stands then.
-        likeness: of the model to the truth.
         floor_seen: which share of the floor of all rooms it saw.
         stands, path_m, robot_s: what it took. contacts, contact_m_per_s: what it touched, and how fast.
         outcomes, errors_m: of the missions: how each ended, and how far from its goal; -1 where there was no model.
@@ -74,7 +180,6 @@ class Explored:
     seed: int
     stopped: str
     home_m: float
-    likeness: Likeness
     floor_seen: float
     stands: int
     path_m: float
@@ -84,10 +189,6 @@ class Explored:
     outcomes: list[str]
     errors_m: list[float]
 
-    @staticmethod
-    def of_record(record: Mapping[str, Any]) -> Explored:
-        return Explored(**{**record, "likeness": Likeness(**record["likeness"])})
-
 
 def explore_floor(case: ExploreCase) -> Explored:
     """Explore a drawn floor, compare, and drive in the model."""
@@ -96,7 +197,7 @@ def explore_floor(case: ExploreCase) -> Explored:
     file = write_bare_floor(folder, case.seed, case.rooms)
     true, rng = load_world(file), np.random.default_rng([case.seed, 11])
     room = str(rng.choice(true.rooms))
-    stage = build_explored_stage(file, room, _draw_place(true, room, rng), float(rng.uniform(0.0, 360.0)))
+    stage = build_explored_stage(file, [(room, *_draw_place(true, room, rng))] * 2, float(rng.uniform(0.0, 360.0)))
     body = stage.body(case.seed)
     start, explorer, stopped = body.truth.world_from_robot, build_explorer(stage, body), ""
     try:
@@ -116,9 +217,11 @@ def explore_floor(case: ExploreCase) -> Explored:
     ends = [_drive(file, true, laid, model, rng, case.seed + k) for k in range(drives)]
     none = case.missions - drives  # in a model without two rooms nobody gets anywhere
     return Explored(
-        case.seed, stopped, truth.world_from_robot.distance_to(start), compare_models(true, model), share,
-        len(explorer.map.stands), truth.path_m, truth.time_s, truth.collisions, truth.contact_m_per_s,
-        [end.outcome for end in ends] + ["no model"] * none, [end.error_m for end in ends] + [-1.0] * none)
+        **asdict(compare_models(true, model)), seed=case.seed, stopped=stopped,
+        home_m=truth.world_from_robot.distance_to(start), floor_seen=share, stands=len(explorer.map.stands),
+        path_m=truth.path_m, robot_s=truth.time_s, contacts=truth.collisions, contact_m_per_s=truth.contact_m_per_s,
+        outcomes=[end.outcome for end in ends] + ["no model"] * none,
+        errors_m=[end.error_m for end in ends] + [-1.0] * none)
 
 
 def _draw_place(world: World, room: str, rng: np.random.Generator) -> tuple[float, float]:
@@ -133,26 +236,19 @@ def _drive(file: Path, true: World, laid: Path, model: World, rng: np.random.Gen
     names = [str(name) for name in rng.choice(sorted(pairs), 2, replace=False)]
     places = {name: _draw_place(true, name, rng) for name in names}
     heading = float(rng.uniform(0.0, 360.0))
-    own: dict[str, Sequence[float]] = {}
+    own: dict[str, tuple[float, float]] = {}
     for name, (x, y) in places.items():
         world = true.world_from_locale(name).apply([x, y, 0.0])
-        own[name] = model.world_from_locale(pairs[name]).inverse().apply(world)[:2].tolist()
+        own_x, own_y, _ = model.world_from_locale(pairs[name]).inverse().apply(world).tolist()
+        own[name] = own_x, own_y
     turn = np.degrees(np.arctan2(*model.world_from_locale(pairs[names[0]]).rotation[1::-1, 0]))
-    mission = _mission(file, names, [places[name] for name in names], heading)
-    stage = build_stage(parse_scenario(mission, "explored", file.parent))
-    inside, ways = [pairs[name] for name in names], [own[name] for name in names]
-    text = _mission(laid, inside, ways, (heading - float(turn)) % 360.0)
+    stage = build_explored_stage(file, [(name, *places[name]) for name in names], heading, PUT_DOWN)
+    ends = [(pairs[name], *own[name]) for name in names]
+    text = format_explored(laid, ends, (heading - float(turn)) % 360.0) + PUT_DOWN
     knows = build_head(replace(stage, scenario=parse_scenario(text, "explored", file.parent)), seed)
     agent = build_agent(knows)
     with SimulatedRun(stage, knows, agent, RunRecorder(None, knows, agent.world, agent.robot)) as run:
         return run.drive(None)
-
-
-def _mission(world: Path, rooms: Sequence[str], places: Sequence[Sequence[float]], heading_deg: float) -> str:
-    ends = [f"({room} ({x / FOOT_M:.5f},{y / FOOT_M:.5f},0))"
-            for room, (x, y) in zip(rooms, places, strict=True)]
-    return (f'world = "{world.resolve()}"\ngoal = "(ptrans {ends[0]} {ends[1]})"\n[start]\n'
-            f"heading_deg = {heading_deg:.5f}\nput_down_sigma_m = 0.02\nput_down_sigma_deg = 1.0\n")
 
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
@@ -169,25 +265,21 @@ def report(ends: Sequence[Explored]) -> Report:
     """The table and the claims of some explorations."""
 
     def total(name: str) -> int:
-        return sum(int(getattr(end.likeness, name)) for end in ends)
+        return sum(int(getattr(end, name)) for end in ends)
 
-    def join(part: Callable[[Explored], Sequence[float]]) -> list[float]:
-        return [value for end in ends for value in part(end)]
-
-    walls = join(lambda end: end.likeness.walls_m)
+    walls = [wall for end in ends for wall in end.walls_m]
     wall_m = float(np.median(walls)) if walls else float("inf")
-    angle = float(np.median([end.likeness.angle_deg for end in ends]))
+    angle = float(np.median([end.angle_deg for end in ends]))
     precision, recall = (total(a) / max(1, total(b)) for a, b in (("own_right", "own_corners"),
                                                                    ("true_found", "true_corners")))
     f1 = 2.0 * precision * recall / max(precision + recall, 1e-9)
     fast = sum(end.contacts for end in ends if end.contact_m_per_s > SOFT_M_PER_S)
     home = sum(not end.stopped and end.home_m <= HOME_M for end in ends)
-    errors, outcomes = join(lambda end: end.errors_m), [one for end in ends for one in end.outcomes]
-    near = sum(o == "reached" and e <= NEAR_M for o, e in zip(outcomes, errors, strict=True))
-    wrong = sum(o == "reached" and e > 0.3 for o, e in zip(outcomes, errors, strict=True))
-    rows = [(f"floor {e.seed}", f"{e.likeness.found_rooms}/{e.likeness.rooms}",
-             f"{e.likeness.found_doors}/{e.likeness.doors}", f"{e.floor_seen:.0%}",
-             100.0 * float(np.median(e.likeness.walls_m)) if e.likeness.walls_m else None,
+    errors = [m if how == "reached" else None for e in ends for how, m in zip(e.outcomes, e.errors_m, strict=True)]
+    near = sum(m is not None and m <= NEAR_M for m in errors)
+    wrong = sum(m is not None and m > 0.3 for m in errors)
+    rows = [(f"floor {e.seed}", f"{e.found_rooms}/{e.rooms}", f"{e.found_doors}/{e.doors}", f"{e.floor_seen:.0%}",
+             100.0 * float(np.median(e.walls_m)) if e.walls_m else None,
              e.contacts, 100.0 * e.home_m, e.path_m, e.robot_s, e.stands,
              f"{sum(o == 'reached' for o in e.outcomes)}/{len(e.outcomes)}", e.stopped) for e in ends]
     floor = float(np.mean([end.floor_seen for end in ends]))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from harvey_survey.axis_map import ACROSS, OUTWARD, AxisMap, LearntDoor, LearntRoom
 from harvey_survey.axis_view import AxisView, FloorLooks, see_axes
-from harvey_survey.seen_floor import CELL_M, Cell, SeenFloor, cell_of, point_of
+from harvey_survey.seen_floor import CELL_M, Cell, SeenFloor, cell_of, near_cell, point_of
 from knowledge_sources.methods.floor.appearance import fit_appearance
 from knowledge_sources.methods.motion.clearance import choose_move
 from world_models.actuator import ActuatorModel
@@ -103,7 +103,6 @@ class Explorer:
 
     def explore(self) -> None:
         """Until nothing is left to be known that can be reached, then home. Raises ExploringStopped."""
-        self._begin()
         while self.take_step():
             pass
         self.go_home()
@@ -126,7 +125,7 @@ class Explorer:
         if goal.door is not None:
             self._go_through(goal.door, goal.cell)
         elif self._go_to(goal.cell):
-            self._look_here(self.map.stands[-1].room)
+            self._add_stand(np.zeros(2), np.full(2, 0.006), self._look_round(), self.map.stands[-1].room)
         else:
             self._given_up.append(point_of(goal.cell))
         return True
@@ -171,9 +170,6 @@ class Explorer:
             self._command(2.0 * math.pi / LOOKS, 0.0)
         views.append(self._see())
         return [view for view in views if view is not None]
-
-    def _look_here(self, room: str) -> None:
-        self._add_stand(np.zeros(2), np.full(2, 0.006), self._look_round(), room)
 
     def _add_stand(self, moved: Floats, sigma_m: Floats, views: list[AxisView], room: str) -> None:
         """A stand with what is seen there, read with all that is known."""
@@ -250,22 +246,20 @@ class Explorer:
         for n in range(len(self.map.stands)):
             here = self.map.position(n)
             self.floor.add_points(here + self.map.floor_points(n, self._floors))
-            self.floor.add_disc(here, DISC_M)
-            if last is not None:
-                self.floor.add_way(last, here, 2.0 * DISC_M)
+            self.floor.add_way(here if last is None else last, here, 2.0 * DISC_M)
             last = here
-        self.floor.add_disc(self.map.position(0), self._blind_m)
+        self.floor.add_way(self.map.position(0), self.map.position(0), 2.0 * self._blind_m)
         for room in self.map.rooms.values():
             for side in (side for side in range(4) if room.walls[side] is not None):
                 begin, end = np.zeros(2), np.zeros(2)
                 begin[1 - ACROSS[side]], end[1 - ACROSS[side]] = room.span(side)
                 begin[ACROSS[side]] = end[ACROSS[side]] = room.limit(side)
-                self.floor.add_wall(begin, end + WALL_M * np.array(OUTWARD[side]))
+                self.floor.add_box(begin, end + WALL_M * np.array(OUTWARD[side]), False)
         for door in self.map.doors:
             begin, end = self._across_door(door, 0.0, DOORWAY_M)
             half = 0.5 * (door.ends_m[1] - door.ends_m[0])
             along = half * np.abs(np.array(OUTWARD[door.side])[::-1])
-            self.floor.add_doorway(begin - along, end + along)
+            self.floor.add_box(begin - along, end + along, True)
 
     @property
     def _blind_m(self) -> float:
@@ -293,7 +287,7 @@ class Explorer:
         for door in self.map.doors:
             if door.behind is None and door.tried < 2:
                 for before_m in (BEFORE_DOOR_M, 1.7, 1.5, 1.2, 0.9):
-                    cell = _near_cell(self._across_door(door, before_m, 0.0)[0], costs, 3)
+                    cell = near_cell(self._across_door(door, before_m, 0.0)[0], costs, 3)
                     if cell is not None:
                         goals.append(Goal(cell, costs[cell] + 3.0, door, f"a doorway of {door.room}"))
                         break
@@ -343,7 +337,7 @@ class Explorer:
         costs, _ = self.floor.costs_from(self.here)
         for behind_m in (BEHIND_DOOR_M, 1.0, 0.8):
             inside = self._across_door(door, 0.0, behind_m)[1]
-            cell = _near_cell(inside, costs, 2)
+            cell = near_cell(inside, costs, 2)
             if cell is not None:
                 break
         else:
@@ -370,7 +364,7 @@ class Explorer:
         """On floor that was seen, to a cell; whether it got there."""
         for _ in range(MAX_LEGS):
             costs, before = self.floor.costs_from(self.here)
-            goal = _near_cell(point_of(cell), costs, 3)
+            goal = near_cell(point_of(cell), costs, 3)
             if goal is None:
                 return False
             if np.hypot(*(point_of(goal) - self.here)) < 0.12:
@@ -446,14 +440,6 @@ def _colour_of(mean: Floats) -> Floats:
     total = math.exp(float(mean[0]))
     red, blue = (float(mean[k]) * total - 2.0 for k in (1, 2))
     return np.asarray(np.clip(np.array([red, total - 6.0 - red - blue, blue]), 0.0, 255.0))
-
-
-def _near_cell(point: Floats, costs: dict[Cell, float], within: int) -> Cell | None:
-    """The cell that can be reached nearest to a point, within so many cells."""
-    i, j = cell_of(point)
-    near = [(i + di, j + dj) for di in range(-within, within + 1) for dj in range(-within, within + 1)]
-    near = [cell for cell in near if cell in costs]
-    return min(near, key=lambda cell: (math.hypot(cell[0] - i, cell[1] - j), cell)) if near else None
 
 
 def _gain(cell: Cell, unseen: NDArray[np.int64]) -> float:

@@ -49,12 +49,11 @@ SIGMA_CM = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A rectangle on a wall: from where to where along it and up [m], its colour 0..255, and what is on it."""
+    """A rectangle on a wall: from where to where along it and up [m], and its colour (3,) 0..255."""
 
     along_m: tuple[float, float]
     up_m: tuple[float, float]
-    colour: tuple[float, float, float]
-    inner: Board | None = None
+    colour: Floats
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,12 +64,14 @@ class WallView:
     seen: Mask
     start_m: float
 
+    def columns(self, low_m: float, high_m: float) -> slice:
+        """Those from a place along the wall to another."""
+        return slice(*(max(0, int((m - self.start_m) / PIXEL_M)) for m in (low_m, high_m)))
+
     def colour(self, along_m: tuple[float, float], up_m: tuple[float, float]) -> Floats | None:
         """The usual colour (3,) of a rectangle; None where hardly any of it was seen."""
-        rows = slice(max(0, int(up_m[0] / PIXEL_M)), max(0, int(up_m[1] / PIXEL_M)))
-        columns = slice(max(0, int((along_m[0] - self.start_m) / PIXEL_M)),
-                        max(0, int((along_m[1] - self.start_m) / PIXEL_M)))
-        found = self.picture[rows, columns][self.seen[rows, columns]]
+        part = slice(max(0, int(up_m[0] / PIXEL_M)), max(0, int(up_m[1] / PIXEL_M))), self.columns(*along_m)
+        found = self.picture[part][self.seen[part]]
         return np.median(found, axis=0) if len(found) >= 20 else None
 
 
@@ -118,22 +119,18 @@ def measure_height(built: AxisMap, room: LearntRoom) -> float:
         for view in stand.views:
             eye = built.position(n) + view.forward_m
             lines = view.lines.take(view.lines.lengths_px >= 30.0)
-            rays = view.camera.rays(lines.segments_px.mean(axis=1)) @ view.mount.camera_from_robot.rotation
             ends = view.camera.rays(lines.segments_px) @ view.mount.camera_from_robot.rotation
-            for ray, pair, length in zip(rays, ends, lines.lengths_px, strict=True):
-                slope = ray[2] / math.hypot(ray[0], ray[1])
-                side, _, _, far = meet_wall(room, eye, math.atan2(ray[1], ray[0]) + view.heading_rad)
-                if slope < 0.02 or side < 0 or room.walls[side] is None or far > SIGHT_M[1]:
-                    continue
-                tops = []
-                for end in pair:
-                    met, _, slant, end_far = meet_wall(room, eye, math.atan2(end[1], end[0]) + view.heading_rad)
-                    end_far -= MOULDING_DEPTH_M * math.hypot(1.0, slant)
-                    tops.append(view.mount.height_m + end_far * end[2] / math.hypot(end[0], end[1]) if met == side
-                                else math.nan)
-                if abs(tops[0] - tops[1]) < 0.03 and 2.0 < tops[0] < MAX_HEIGHT_M:
-                    heights.append(0.5 * (tops[0] + tops[1]))
-                    weights.append(float(length))
+            slopes = ends[..., 2] / np.hypot(ends[..., 0], ends[..., 1])
+            bearings = np.arctan2(ends[..., 1], ends[..., 0]) + view.heading_rad
+            for slope, pair, length in zip(slopes.tolist(), bearings.tolist(), lines.lengths_px.tolist(), strict=True):
+                (side, _, *a), (other, _, *b) = (meet_wall(room, eye, bearing) for bearing in pair)
+                is_seen = side == other >= 0 and room.walls[side] is not None and min(a[1], b[1]) < SIGHT_M[1]
+                if is_seen and min(slope) > 0.02:
+                    low, high = sorted(view.mount.height_m + rise * (far - MOULDING_DEPTH_M * math.hypot(1.0, slant))
+                                       for rise, (slant, far) in zip(slope, (a, b), strict=True))
+                    if high - low < 0.03 and 2.0 < low < MAX_HEIGHT_M:
+                        heights.append(0.5 * (low + high))
+                        weights.append(length)
     if not heights:
         return USUAL_HEIGHT_M
     at, weight = np.array(heights), np.array(weights)
@@ -143,8 +140,8 @@ def measure_height(built: AxisMap, room: LearntRoom) -> float:
     return float(np.average(at[near], weights=weight[near]))
 
 
-def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, float]]) -> list[Board]:
-    """The rectangles on a wall that differ from it, outside its doorways."""
+def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, float]]) -> list[list[Board]]:
+    """The rectangles on a wall that differ from it, outside its doorways, each with that which is on it."""
     columns = wall.seen.shape[1]
     usable = wall.seen.copy()
     usable[: int((BASEBOARD_HEIGHT_M + 0.04) / PIXEL_M)] = False
@@ -152,10 +149,7 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
     edge = int(0.06 / PIXEL_M)
     usable[:, :edge], usable[:, columns - edge :] = False, False
     for low, high in doors:
-        margin = CASING_WIDTH_M + 0.05
-        columns_of = slice(max(0, int((low - margin - wall.start_m) / PIXEL_M)),
-                           max(0, int((high + margin - wall.start_m) / PIXEL_M)))
-        usable[:, columns_of] = False
+        usable[:, wall.columns(low - CASING_WIDTH_M - 0.05, high + CASING_WIDTH_M + 0.05)] = False
     if np.count_nonzero(usable) < 100:
         return []
     smooth = cv2.medianBlur(wall.picture.astype(np.uint8), 5).astype(float)
@@ -176,19 +170,11 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
         differs = np.zeros_like(unlike)
         differs[r0 + 1 : r1 - 1, c0 + 1 : c1 - 1] = (
             np.abs(smooth[r0 + 1 : r1 - 1, c0 + 1 : c1 - 1] - outer).max(axis=2) > UNLIKE)
-        inner = None
-        for (i0, i1), (j0, j1) in _find_boxes(differs)[:1]:
-            inner = _board(wall, i0, i1, j0, j1, np.median(smooth[i0:i1, j0:j1].reshape(-1, 3), axis=0))
-        boards.append(_board(wall, r0, r1, c0, c1, outer, inner))
+        inner = [((rows, columns), np.median(smooth[slice(*rows), slice(*columns)].reshape(-1, 3), axis=0))
+                 for rows, columns in _find_boxes(differs)[:1]]
+        boards.append([Board((wall.start_m + a * PIXEL_M, wall.start_m + b * PIXEL_M), (low * PIXEL_M, high * PIXEL_M),
+                             colour) for ((low, high), (a, b)), colour in [(box, outer), *inner]])
     return boards
-
-
-def _board(
-    wall: WallView, r0: int, r1: int, c0: int, c1: int, colour: Floats, inner: Board | None = None
-) -> Board:
-    red, green, blue = colour.tolist()
-    return Board((wall.start_m + c0 * PIXEL_M, wall.start_m + c1 * PIXEL_M), (r0 * PIXEL_M, r1 * PIXEL_M),
-                 (red, green, blue), inner)
 
 
 def _touches(usable: Mask, box: tuple[tuple[int, int], tuple[int, int]]) -> bool:
@@ -252,8 +238,9 @@ def _format_room(built: AxisMap, room: LearntRoom, views: Sequence[WallView], fi
         colour = view.colour(room.span(side), (0.2, room.height_m - 0.2))
         finish = "unknown" if colour is None else _finish(finishes, f"{room.name}-{SIDES[side]}", colour, side)
         walls.append(f'{SIDES[side]} = "{finish}"')
-        for board in find_boards(view, room.height_m, ways):
-            things.append(_format_board(board, side, origin[1 - ACROSS[side]], f"{room.name}-{len(things)}", finishes))
+        for boards in find_boards(view, room.height_m, ways):
+            name = f"{room.name}-{len(things)}"
+            things.append(_format_boards(boards, side, origin[1 - ACROSS[side]], name, finishes))
     floor = _finish(finishes, f"{room.name}-floor", room.floor.colour, -1)
     lines = ["", f"[locales.{room.name}]", 'kind = "room"', 'in = "storey"',
              f"at = [{origin[0]:.3f}, {origin[1]:.3f}]", f"size = [{size[0]:.3f}, {size[1]:.3f}]",
@@ -283,29 +270,18 @@ def _has_strip(views: Sequence[WallView], up_m: tuple[float, float], beside_m: t
     return np.median(strips, axis=0) if strips and 2 * differ > len(strips) else None
 
 
-def _format_board(board: Board, side: int, origin_m: float, name: str, finishes: dict[str, str]) -> str:
-    middle, up = 0.5 * (board.along_m[0] + board.along_m[1]), 0.5 * (board.up_m[0] + board.up_m[1])
-    boxes: list[str] = []
-    depth, one = BOARD_DEPTH_M, board
-    while True:
-        # A box's x is to the right of who stands with the back to the wall.
-        x = sorted(_right_of(side) * (end - middle) for end in one.along_m)
-        z = [end - up for end in one.up_m]
-        finish = _finish(finishes, f"{name}-{len(boxes)}", np.array(one.colour), side)
-        boxes.append(f"{{ x = [{x[0]:.3f}, {x[1]:.3f}], y = [0.0, {depth:.3f}], z = [{z[0]:.3f}, {z[1]:.3f}], "
-                     f'finish = "{finish}" }}')
-        if one.inner is None:
-            break
-        one, depth = one.inner, depth + 0.005
+def _format_boards(boards: Sequence[Board], side: int, origin_m: float, name: str, finishes: dict[str, str]) -> str:
+    middle, up = (0.5 * sum(ends) for ends in (boards[0].along_m, boards[0].up_m))
+    out, boxes = OUTWARD[side], list[str]()
+    right = (-out[1], out[0])[1 - ACROSS[side]]  # a box's x is to the right of who stands with the back to the wall
+    for number, board in enumerate(boards):
+        x = sorted(right * (end - middle) for end in board.along_m)
+        z = [end - up for end in board.up_m]
+        finish = _finish(finishes, f"{name}-{number}", board.colour, side)
+        boxes.append(f"{{ x = [{x[0]:.3f}, {x[1]:.3f}], y = [0.0, {BOARD_DEPTH_M + 0.005 * number:.3f}], "
+                     f'z = [{z[0]:.3f}, {z[1]:.3f}], finish = "{finish}" }}')
     return (f'{{ name = "{name}", wall = "{SIDES[side]}", along = {middle - origin_m:.3f}, up = {up:.3f}, '
             f"boxes = [{', '.join(boxes)}] }}")
-
-
-def _right_of(side: int) -> float:
-    """Whether x to the right, the back to the wall, is with or against the axis along a wall."""
-    out = OUTWARD[side]
-    right = (-out[1], out[0])
-    return right[1 - ACROSS[side]]
 
 
 def _format_door(
@@ -333,7 +309,7 @@ def _measure_door(view: WallView, low: float, high: float) -> tuple[float, Float
     frame = np.mean(boards, axis=0) if boards else None
     if frame is None or (wall is not None and np.abs(frame - wall).max() < UNLIKE):
         return 2.0, None
-    columns = slice(int((low + 0.1 - view.start_m) / PIXEL_M), int((high - 0.1 - view.start_m) / PIXEL_M))
+    columns = view.columns(low + 0.1, high - 0.1)
     like = (np.abs(view.picture[:, columns] - frame).max(axis=2) < UNLIKE) & view.seen[:, columns]
     share = like.mean(axis=1)
     rows = [r for r in range(int(1.8 / PIXEL_M), len(share) - 5) if share[r : r + 5].mean() > 0.6]

@@ -7,6 +7,7 @@ by all of its lines that were found in that picture; the part that the pose has 
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +15,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from harvey_survey.offsets import SIGMA_PX, measure_offsets, measure_slopes
-from harvey_survey.seen_pictures import SeenPicture, light_of, read_looks
+from harvey_survey.seen_pictures import (
+    LIGHTS,
+    SIGMA_PX,
+    SeenPicture,
+    light_of,
+    measure_offsets,
+    measure_slopes,
+    read_looks,
+)
 from logs.run_directory import RunDirectory
+from world_models.building.geometry.landmarks import Landmark
 from world_models.building.model_errors import WALL, LineErrors, find_line_errors
 from world_models.building.world import World
 from world_models.camera import CAMERA_UNKNOWNS
@@ -137,14 +146,16 @@ def build_ledger(world: World, looks: Sequence[SeenPicture]) -> Ledger:
     tallies: dict[str, _Tally] = {}
     measured: dict[tuple[str, tuple[float, float, float]], list[tuple[float, float]]] = {}
     for look in looks:
-        for name, rows in _group_by_mark(look).items():
+        groups: dict[str, list[int]] = {}
+        for i, mark in enumerate(look.marks):
+            groups.setdefault(mark.name, []).append(i)
+        for name, rows in groups.items():
             tallies.setdefault(name, _Tally()).add(look, rows)
         for way, direction, mean_m, variance in _measure_modes(world, look):
             measured.setdefault((way, direction), []).append((mean_m, variance))
         for (name, number), offset, slope in _list_offsets(look):
             tallies[name].offsets.setdefault(number, []).append((offset, slope))
-    elements = [tallies[mark.name].build(mark.name, mark.locale, mark.kind, mark.source)
-                for mark in world.landmarks if mark.name in tallies]
+    elements = [tallies[mark.name].build(mark) for mark in world.landmarks if mark.name in tallies]
     combined = [_combine(*way, measured[way]) for way in sorted(measured)]
     return Ledger(world.name, tuple(sorted({look.run for look in looks})), len(looks), tuple(elements),
                   tuple(offset for offset in combined if offset is not None))
@@ -155,24 +166,14 @@ def errors_of(world: World, look: SeenPicture, unstated_m: float) -> LineErrors:
     return find_line_errors(world, look.marks, look.numbers.tolist(), unstated_m)
 
 
-def _group_by_mark(look: SeenPicture) -> dict[str, list[int]]:
-    groups: dict[str, list[int]] = {}
-    for i, mark in enumerate(look.marks):
-        groups.setdefault(mark.name, []).append(i)
-    return groups
-
-
 @dataclass
 class _Tally:
     """What is counted of one landmark so far; offsets: of each line, of each segment its offset and slopes [px, px/m].
     """
 
-    counts: LedgerCounts = LedgerCounts()
     pictures: int = 0
     unseen: int = 0
-    by_light: dict[str, LedgerCounts] = field(default_factory=dict)
-    by_distance: dict[str, LedgerCounts] = field(default_factory=dict)
-    by_line: dict[int, LedgerCounts] = field(default_factory=dict)
+    counts: defaultdict[str | int, LedgerCounts] = field(default_factory=lambda: defaultdict(LedgerCounts))
     offsets: dict[int, list[tuple[Floats, Floats]]] = field(default_factory=dict)
 
     def add(self, look: SeenPicture, rows: Sequence[int]) -> None:
@@ -181,20 +182,16 @@ class _Tally:
         light, far = light_of(look), look.distances_m
         for i in rows:
             seen = bool(look.found[i]), bool(look.hidden[i])
-            distance = DISTANCES[int(far[i] > NEAR_M) + int(far[i] > FAR_M)]
-            self.counts = self.counts.plus(*seen)
-            for counts, key in ((self.by_light, light), (self.by_distance, distance)):
-                counts[key] = counts.get(key, LedgerCounts()).plus(*seen)
-            self.by_line[int(look.numbers[i])] = self.by_line.get(int(look.numbers[i]), LedgerCounts()).plus(*seen)
+            for key in ("all", light, DISTANCES[int(far[i] > NEAR_M) + int(far[i] > FAR_M)], int(look.numbers[i])):
+                self.counts[key] = self.counts[key].plus(*seen)
 
-    def build(self, name: str, room: str, kind: str, source: str) -> LedgerElement:
-        lines = tuple(_build_line(n, counts, self.offsets.get(n, [])) for n, counts in sorted(self.by_line.items()))
-        return LedgerElement(name, room, kind, source, self.counts, self.pictures, self.unseen,
-                             _in_order(self.by_light), _in_order(self.by_distance), lines)
-
-
-def _in_order(counts: dict[str, LedgerCounts]) -> dict[str, LedgerCounts]:
-    return {key: counts[key] for key in ("dark", "middling", "bright", *DISTANCES) if key in counts}
+    def build(self, mark: Landmark) -> LedgerElement:
+        lines = tuple(_build_line(n, self.counts[n], self.offsets.get(n, []))
+                      for n in sorted(key for key in self.counts if isinstance(key, int)))
+        by_light, by_distance = ({key: self.counts[key] for key in keys if key in self.counts}
+                                 for keys in (LIGHTS, DISTANCES))
+        return LedgerElement(mark.name, mark.locale, mark.kind, mark.source, self.counts["all"], self.pictures,
+                             self.unseen, by_light, by_distance, lines)
 
 
 def _build_line(number: int, counts: LedgerCounts, offsets: Sequence[tuple[Floats, Floats]]) -> LineEntry:

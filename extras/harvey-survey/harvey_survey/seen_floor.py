@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import cv2
 import numpy as np
@@ -53,25 +53,15 @@ class SeenFloor:
         self._seen[cells[:, 0], cells[:, 1]] = 1
         self._free = None
 
-    def add_disc(self, point: Floats, radius_m: float) -> None:
-        i, j = cell_of(point)
-        cv2.circle(self._seen, (j, i), round(radius_m / CELL_M), 1, -1)
-        self._free = None
-
     def add_way(self, begin: Floats, end: Floats, width_m: float) -> None:
-        """A strip that the robot has driven over."""
+        """A strip that the robot has driven over, or may stand on; round at its ends."""
         (a, b), (c, d) = cell_of(begin), cell_of(end)
         cv2.line(self._seen, (b, a), (d, c), 1, max(1, round(width_m / CELL_M)))
         self._free = None
 
-    def add_wall(self, begin: Floats, end: Floats) -> None:
-        """A wall, along an axis: nothing leads through it but doorways."""
-        self._walls.append((begin, end))
-        self._free = None
-
-    def add_doorway(self, corner: Floats, opposite: Floats) -> None:
-        """The floor between jambs, along the axes."""
-        self._ways.append((corner, opposite))
+    def add_box(self, corner: Floats, opposite: Floats, is_way: bool) -> None:
+        """A wall, through which nothing leads but doorways; or a way, as the floor between jambs. Along the axes."""
+        (self._ways if is_way else self._walls).append((corner, opposite))
         self._free = None
 
     @property
@@ -93,12 +83,6 @@ class SeenFloor:
                 seen[i0:i1, j0:j1].astype(np.uint8), cv2.DIST_L2, 5)
             self._free = np.asarray(self._away > self._radius_m + MARGIN_M)
 
-    def is_free(self, point: Floats) -> bool:
-        """Whether the robot may stand there."""
-        self._update()
-        assert self._free is not None
-        return bool(self._free[cell_of(point)])
-
     def find_clearance(self, begin: Floats, end: Floats) -> Clearance:
         """Where on a straight way something may be touched."""
         self._update()
@@ -115,10 +99,11 @@ class SeenFloor:
         self._update()
         free, away = self._free, self._away
         assert free is not None and away is not None
-        start = self._nearest_free(cell_of(point))
+        cells = np.argwhere(free)
+        names: list[Cell] = [(i, j) for i, j in cells.tolist()]
+        start = near_cell(point, set(names), 8)
         if start is None:
             return {}, {}
-        cells = np.argwhere(free)
         number = np.zeros(free.shape, np.int32)
         number[cells[:, 0], cells[:, 1]] = np.arange(len(cells))
         begins, ends, lengths = [], [], []
@@ -134,20 +119,8 @@ class SeenFloor:
         graph = csr_array((np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))),
                           shape=(len(cells), len(cells)))
         found, last = dijkstra(graph, directed=False, indices=int(number[start]), return_predecessors=True)
-        names: list[Cell] = [(i, j) for i, j in cells.tolist()]
         costs = {names[k]: float(found[k]) for k in np.flatnonzero(np.isfinite(found))}
         return costs, {names[k]: names[last[k]] for k in np.flatnonzero(last >= 0)}
-
-    def _nearest_free(self, cell: Cell, within: int = 8) -> Cell | None:
-        assert self._free is not None
-        if self._free[cell]:
-            return cell
-        i0, j0 = cell[0] - within, cell[1] - within
-        rows = np.argwhere(self._free[i0 : cell[0] + within + 1, j0 : cell[1] + within + 1])
-        if not len(rows):
-            return None
-        i, j = rows[np.argmin(np.sum((rows - within) ** 2, axis=1))]
-        return int(i + i0), int(j + j0)
 
     def way_to(self, goal: Cell, before: dict[Cell, Cell]) -> list[Floats]:
         """Straight legs to a cell: their ends [m]."""
@@ -181,6 +154,14 @@ def cell_of(point: Floats | Sequence[float]) -> Cell:
 def point_of(cell: Cell) -> Floats:
     """The middle of a cell [m]."""
     return (np.array(cell) - SIDE // 2 + 0.5) * CELL_M
+
+
+def near_cell(point: Floats, cells: Container[Cell], within: int) -> Cell | None:
+    """The nearest to a point of some cells, within so many."""
+    i, j = cell_of(point)
+    near = [(i + di, j + dj) for di in range(-within, within + 1) for dj in range(-within, within + 1)]
+    near = [cell for cell in near if cell in cells]
+    return min(near, key=lambda cell: (math.hypot(cell[0] - i, cell[1] - j), cell)) if near else None
 
 
 def _cells(points: Floats) -> NDArray[np.int64]:

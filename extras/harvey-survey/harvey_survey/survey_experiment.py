@@ -6,13 +6,14 @@ The truth is the simulator's; the survey sees journals alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.generated.missions import write_inexact_mission
 from experiments.report import Report
 from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
 from harvey.simulation.simulated_run import build_head, run_mission
@@ -21,7 +22,6 @@ from harvey_survey.ledger import build_ledger
 from harvey_survey.patch_file import build_patch, write_world
 from harvey_survey.seen_pictures import read_looks
 from harvey_survey.survey_changes import SurveyChange, propose_changes
-from harvey_survey.wrong_buildings import write_missions
 from logs.run_directory import RunDirectory
 from sim.ground_truth.inexact import TrueInexact, displace
 from sim.scenario import parse_scenario
@@ -35,7 +35,7 @@ from world_models.units import INCH_M
 
 SIGMA_M, MISSING = 0.05, 0.15
 TRUTH = TrueInexact(sigma_m=SIGMA_M, missing=MISSING)
-BUILDINGS, MISSIONS, AFTER = 8, 6, 2
+BUILDINGS, MISSIONS, AFTER, ROOMS = 8, 6, 2, 4
 QUICK = 1, 3, 1
 """Buildings, missions by which each is surveyed, and missions in the surveyed model."""
 FIRST_SEED = 100
@@ -84,7 +84,9 @@ class SurveyedBuilding:
 def survey_building(case: BuildingCase) -> SurveyedBuilding:
     """Drive, survey, judge, and drive again."""
     folder = Path(case.folder) / f"floor-{case.seed}"
-    paths = write_missions(folder, case.seed, TRUTH, case.missions + case.after, SIGMA_M)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [write_inexact_mission(folder, case.seed, TRUTH, stated_m=SIGMA_M, rooms=ROOMS, draw=(17, n),
+                                   name=f"mission-{n}") for n in range(case.missions + case.after)]
     runs = []
     for number, path in enumerate(paths[: case.missions]):
         run = RunDirectory(folder / f"run-{number}")
@@ -205,17 +207,11 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
 
 def report(ends: Sequence[SurveyedBuilding]) -> Report:
     """The table and the claims of some buildings."""
-
-    def join(part: Callable[[SurveyedBuilding], Sequence[float]]) -> list[float]:
-        return [value for end in ends for value in part(end)]
-
-    def total(part: Callable[[SurveyedBuilding], int]) -> int:
-        return sum(map(part, ends))
-
-    before, after, z = join(lambda e: e.before_m), join(lambda e: e.after_m), np.abs(join(lambda e: e.z))
-    gone, found, changes, wrong = (total(part) for part in (
-        lambda e: e.gone, lambda e: e.gone_found, lambda e: e.changes, lambda e: e.wrong))
-    held, reached, driven = int(np.count_nonzero(z <= WITHIN_95)), total(lambda e: e.reached), total(lambda e: e.driven)
+    before, after = [m for e in ends for m in e.before_m], [m for e in ends for m in e.after_m]
+    z = np.abs([z for e in ends for z in e.z])
+    gone, found, changes, wrong, reached, driven = np.sum(
+        [(e.gone, e.gone_found, e.changes, e.wrong, e.reached, e.driven) for e in ends], axis=0).tolist()
+    held = int(np.count_nonzero(z <= WITHIN_95))
     rows = [(f"floor {e.seed}", e.pictures, len(e.after_m), *_spread_cm(e.before_m), *_spread_cm(e.after_m),
              _share(np.abs(e.z) <= WITHIN_95), f"{e.gone_found}/{e.gone}", f"{e.wrong}/{e.changes}",
              f"{e.reached}/{e.driven}") for e in ends]

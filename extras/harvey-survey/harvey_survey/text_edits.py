@@ -10,9 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from harvey_survey.survey_changes import SurveyChange
 from world_models.building.model_errors import WALL
 from world_models.files.construction.builder import compute_world_poses
@@ -27,17 +24,12 @@ INTO_AXIS = {"west": (0, 1.0), "east": (0, -1.0), "south": (1, 1.0), "north": (1
 """Of the walls of a room with a size: the axis along which one moves, and the way into the room."""
 
 
+Edit = tuple[int, int, str]
+"""From where to where in a text it becomes another."""
+
+
 class CannotEditError(Exception):
     """A change cannot be made in the text; says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class Edit:
-    """The text from ``start`` to ``end`` becomes another."""
-
-    start: int
-    end: int
-    text: str
 
 
 @dataclass
@@ -110,10 +102,10 @@ class _Editor:
         edits = [self._rewrite(key, by_cm) for key, by_cm in self._grown.items()]
         edits += self._take_out()
         text, last = "", 0
-        for edit in sorted(edits, key=lambda edit: (edit.start, edit.end)):
-            if edit.start >= last:  # a number in what is taken out goes with it
-                text += self._text[last : edit.start] + edit.text
-                last = edit.end
+        for start, end, new in sorted(edits):
+            if start >= last:  # a number in what is taken out goes with it
+                text += self._text[last:start] + new
+                last = end
         return text + self._text[last:]
 
     # -- numbers ---------------------------------------------------------------------------------------------------
@@ -124,20 +116,23 @@ class _Editor:
 
     def _number(self, key: Key) -> Key:
         """The key, where a number stands there in this file. Raises CannotEditError."""
-        if key in self._spans:
-            start, end = self._spans[key]
-            try:
-                float(self._text[start:end].replace("_", ""))
-            except ValueError:
-                raise CannotEditError(f"{_words(key)} is no single number") from None
-            return key
-        raise CannotEditError(f"{_words(key)} does not stand in {self._source.name} itself")
+        words = ".".join(map(str, key))
+        if key not in self._spans:
+            raise CannotEditError(f"{words} does not stand in {self._source.name} itself")
+        try:
+            self._read(key)
+        except ValueError:
+            raise CannotEditError(f"{words} is no single number") from None
+        return key
+
+    def _read(self, key: Key) -> float:
+        start, end = self._spans[key]
+        return float(self._text[start:end].replace("_", ""))
 
     def _rewrite(self, key: Key, by_cm: float) -> Edit:
         start, end = self._spans[key]
-        value = float(self._text[start:end].replace("_", "")) + 0.01 * by_cm / self._unit_m
-        text = f"{value:.{DIGITS}f}".rstrip("0").rstrip(".")
-        return Edit(start, end, "0.0" if text in ("-0", "0") else text)
+        text = f"{self._read(key) + 0.01 * by_cm / self._unit_m:.{DIGITS}f}".rstrip("0").rstrip(".")
+        return start, end, "0.0" if text in ("-0", "0") else text
 
     # -- things ----------------------------------------------------------------------------------------------------
 
@@ -177,7 +172,7 @@ class _Editor:
             start, end = self._spans[place.node.key]
             own = name.partition("/")[2]
             is_table = self._text[start] == "{"
-            edits.append(Edit(start + 1, start + 1, f' name = "{own}",') if is_table else Edit(end, end, f', "{own}"'))
+            edits.append((start + 1, start + 1, f' name = "{own}",') if is_table else (end, end, f', "{own}"'))
         return edits
 
     def _list_renumbered(self) -> list[str]:
@@ -199,9 +194,9 @@ class _Editor:
             start, end = self._spans[row]
         before = len(self._text[:start].rstrip())
         if self._text[before - 1] == ",":
-            return Edit(before - 1, end, "")
+            return before - 1, end, ""
         after = len(self._text) - len(self._text[end:].lstrip())
-        return Edit(start, after + 1 if self._text[after : after + 1] == "," else end, "")
+        return start, after + 1 if self._text[after : after + 1] == "," else end, ""
 
     # -- walls -----------------------------------------------------------------------------------------------------
 
@@ -220,25 +215,19 @@ class _Editor:
         found = []
         for door in self._spec.doors:
             if door.is_open and len(door.between) == 2 and room in door.between:
-                other = door.between[1 - door.between.index(room)]
-                wall_of = {door.between[0]: door.wall, door.between[1]: self._find_back(door.between, door.wall)}
-                if wall_of[room] == wall:
-                    found.append((other, wall_of[other]))
+                is_first = door.between[0] == room
+                other = door.between[is_first]
+                back = self._find_back(room, wall, other)
+                if door.wall == (wall if is_first else back):
+                    found.append((other, back))
         return list(dict.fromkeys(found))
 
-    def _find_back(self, between: tuple[str, ...], wall: str) -> str:
-        """The wall of the second of two rooms that is the back of a wall of the first."""
-        if wall not in INTO_AXIS:
-            raise CannotEditError(f"{between[0]} has an outline")
+    def _find_back(self, room: str, wall: str, other: str) -> str:
+        """The wall of another room that is the back of a wall of this one."""
         axis, sign = INTO_AXIS[wall]
-        into = [0.0, 0.0, 0.0]
-        into[axis] = sign
-        one, other = (self._world_rotation(name) for name in between)
-        seen = -(other.T @ (one @ np.array(into)))
+        places = compute_world_poses(self._spec.locales, self._spec.name)
+        seen = -sign * (places[other].rotation.T @ places[room].rotation[:, axis])
         return max(INTO_AXIS, key=lambda name: float(seen[INTO_AXIS[name][0]] * INTO_AXIS[name][1]))
-
-    def _world_rotation(self, name: str) -> NDArray[np.float64]:
-        return compute_world_poses(self._spec.locales, self._spec.name)[name].rotation
 
     def _list_side(self, room: str, wall: str, into_cm: float) -> dict[Key, float]:
         """The numbers of one side: the room's size, and, where its origin moves, its place and all that is in it."""
@@ -264,7 +253,3 @@ class _Editor:
         if any(room in link.between for link in self._spec.links):
             raise CannotEditError(f"{room} has an elevator or stairs")
         return numbers
-
-
-def _words(key: Key) -> str:
-    return ".".join(map(str, key))

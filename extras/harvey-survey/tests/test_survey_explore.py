@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,23 +10,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harvey.commands.command import CliCommand
-from harvey.errors import BadInput
-from harvey_survey.axis_map import AxisMap, LearntRoom, meet_wall
+from harvey.cli import main
+from harvey_survey.axis_map import AxisMap, LearntRoom
 from harvey_survey.axis_view import FloorLooks, see_axes
-from harvey_survey.explore_command import EXPLORE, build_explored_stage, build_explorer
-from harvey_survey.explore_floors import compare_models, lay_into_world, write_bare_floor
+from harvey_survey.explore_command import build_explored_stage, build_explorer
+from harvey_survey.explore_experiment import compare_models, lay_into_world, write_bare_floor
 from harvey_survey.explorer import Explorer, ExploringStopped
 from harvey_survey.learnt_world import write_learnt_world
 from harvey_survey.seen_floor import SeenFloor, cell_of
 from sim.body.simulated_body import SimulatedBody
 from sim.stage import Stage
-from world_models.entries import BodyFault, CameraPicture, Contact, MotionReport, MotorCommand
+from world_models.entries import Contact
 from world_models.files.world_files import load_world
 from world_models.frames import Pose2, wrap_angle
 
 SEED, ROOMS = 7009, 2
-START, HEADING_DEG = (1.5, 1.6), 37.0
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +34,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def stage(file: Path) -> Stage:
-    return build_explored_stage(file, "room-0-north-0", START, HEADING_DEG)
+    return build_explored_stage(file, [("room-0-north-0", 1.5, 1.6)] * 2, 37.0)
 
 
 @dataclass
@@ -48,23 +45,14 @@ class KeptBody:
     answers: list[Any] = field(default_factory=list)
     given: int = 0
 
-    def _answer(self, ask: Callable[[], Any]) -> Any:
-        own = ask()
-        if self.given < len(self.answers):
-            own = self.answers[self.given]
-        else:
-            self.answers.append(own)
-        self.given += 1
-        return own
+    def __getattr__(self, name: str) -> Any:
+        def answer(*asked: Any) -> Any:
+            own = getattr(self.body, name)(*asked)
+            self.answers[self.given :] = self.answers[self.given :] or [own]
+            self.given += 1
+            return self.answers[self.given - 1]
 
-    def execute(self, command: MotorCommand, /) -> MotionReport | BodyFault:
-        return self._answer(lambda: self.body.execute(command))
-
-    def look(self, purpose: str, /) -> CameraPicture | BodyFault:
-        return self._answer(lambda: self.body.look(purpose))
-
-    def take_contact(self) -> Contact | None:
-        return self._answer(self.body.take_contact)
+        return answer
 
 
 @pytest.fixture(scope="module")
@@ -109,22 +97,13 @@ def test_the_map_is_found_by_linear_equations() -> None:
     assert 0.0 < built.sigmas["stand", 1, 0] < 0.01 < built.sigmas["stand", 1, 1]
 
 
-@pytest.mark.parametrize(("bearing_deg", "side", "along"), [(0.0, 1, 1.0), (90.0, 2, 1.0), (225.0, 0, 0.0)])
-def test_a_ray_meets_the_wall_before_it(bearing_deg: float, side: int, along: float) -> None:
-    room = LearntRoom("room", FloorLooks(np.zeros(3), np.eye(3), np.zeros(3)), [0.0, 4.0, 3.0, -1.0])
-    met, at, _, far = meet_wall(room, np.array([1.0, 1.0]), math.radians(bearing_deg))
-    assert (met, at) == (side, pytest.approx(along))
-    assert far > 0.9
-    assert meet_wall(room, np.array([9.0, 1.0]), 0.0)[0] == -1
-
-
 def test_no_way_leads_through_a_wall_but_by_a_doorway() -> None:
     floor = SeenFloor(0.35)
     for x in (0.0, 2.0):
         floor.add_way(np.array([x, -2.0]), np.array([x, 2.0]), 2.1)
-    floor.add_wall(np.array([1.0, -4.0]), np.array([1.08, 4.0]))
+    floor.add_box(np.array([1.0, -4.0]), np.array([1.08, 4.0]), False)
     assert cell_of((2.0, 0.0)) not in floor.costs_from(np.zeros(2))[0]
-    floor.add_doorway(np.array([0.9, -0.5]), np.array([1.2, 0.5]))
+    floor.add_box(np.array([0.9, -0.5]), np.array([1.2, 0.5]), True)
     costs, before = floor.costs_from(np.zeros(2))
     assert floor.way_to(cell_of((2.0, 0.0)), before)
     assert costs[cell_of((2.0, 0.0))] >= 1.9
@@ -181,11 +160,8 @@ def test_a_contact_stops_it(stage: Stage) -> None:
 @pytest.mark.parametrize(("more", "expected"), [
     (["--out", "learnt.txt"], "ends in .toml"), (["--out", "x.toml", "--start", "nowhere"], "--start: expected a room"),
 ])
-def test_the_command_says_what_it_expects(file: Path, more: list[str], expected: str) -> None:
-    assert isinstance(EXPLORE, CliCommand)
-    from argparse import ArgumentParser
-
-    parser = ArgumentParser()
-    EXPLORE.arguments(parser)
-    with pytest.raises(BadInput, match=expected):
-        EXPLORE.run(parser.parse_args(["--world", str(file), "--start", "room-0-north-0", *more]))
+def test_the_command_says_what_it_expects(
+    file: Path, more: list[str], expected: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["explore", "--world", str(file), "--start", "room-0-north-0", *more]) == 2
+    assert expected in capsys.readouterr().err
