@@ -65,7 +65,6 @@ class Adjustment:
         segments: (k,) how many.
         looks, used, of: pictures; segments that agree; and all.
         noise: root of the mean square of what is left, in standard deviations of a segment's end.
-        cameras: (r, 7) steps of the camera of each run.
     """
 
     ways: tuple[str, ...]
@@ -79,7 +78,6 @@ class Adjustment:
     used: int
     of: int
     noise: float
-    cameras: Floats
 
     @property
     def sigmas_m(self) -> Floats:
@@ -190,7 +188,7 @@ class _Problem:
         return Adjustment(
             self._ways, np.array([self._directions[way] for way in self._ways]).reshape(-1, 3), self._offs_m,
             np.asarray(covariance, float), self._priors_m, pictures, segments, len(self._pictures), len(squares),
-            sum(len(picture.look.pairs) for picture in self._pictures), noise, self._cameras)
+            sum(len(picture.look.pairs) for picture in self._pictures), noise)
 
     def _match_again(self, within_px: float) -> None:
         for picture in self._pictures:

@@ -107,6 +107,12 @@ class LearntRoom:
         """x from, y from, x to, y to."""
         return self.limit(3), self.limit(0), self.limit(1), self.limit(2)
 
+    def corners(self, side: int) -> tuple[Floats, Floats]:
+        """Both ends of a wall [m]."""
+        begin, end = np.full(2, self.limit(side)), np.full(2, self.limit(side))
+        begin[1 - ACROSS[side]], end[1 - ACROSS[side]] = self.span(side)
+        return begin, end
+
     def span(self, side: int) -> tuple[float, float]:
         """From where to where a wall goes, along it."""
         x0, y0, x1, y1 = self.box
@@ -199,6 +205,12 @@ class AxisMap:
             for foot in view.find_feet(floors):
                 self._pair_foot(self.rooms[room], stand, foot, False)
         self.solve()
+
+    def list_ways(self, room: str) -> list[tuple[int, tuple[float, float]]]:
+        """The doorways of a room: side, and from where to where along the wall."""
+        own = [(door.side, door.ends_m) for door in self.doors if door.room == room]
+        return [*own, *(((door.side + 2) % 4, door.far_ends_m or door.ends_m) for door in self.doors
+                        if door.behind == room)]
 
     def _beside(self, room: str) -> list[str]:
         """The rooms behind the doorways of a room."""
@@ -464,8 +476,7 @@ class AxisMap:
         s = self.stands[stand]
         room = self.rooms[s.room]
         here, points = self.position(stand), []
-        ways = [(door.side, door.ends_m) for door in self.doors if door.room == s.room]
-        ways += [((door.side + 2) % 4, door.far_ends_m or door.ends_m) for door in self.doors if door.behind == s.room]
+        ways = self.list_ways(s.room)
         key: Key = (len(floors), *np.round([*room.box, *here, *(m for _, ends in ways for m in ends)], 2).tolist())
         if stand in self._points and self._points[stand][0] == key:
             return self._points[stand][1]

@@ -156,10 +156,9 @@ class AxisView:
         ends = _to_floor(lines.segments_px, self)
         far = np.linalg.norm(ends, axis=2).max(axis=1)
         step = ends[:, 1] - ends[:, 0]
-        angle = np.arctan2(step[:, 1], step[:, 0])
-        off = np.abs(np.mod(angle + RIGHT_RAD / 2.0, RIGHT_RAD) - RIGHT_RAD / 2.0)
-        slack = np.minimum(3.0 * self._floor_angle_sigma(lines), 2.0 * AXIS_RAD)
-        kept = np.flatnonzero((far < MAX_SIGHT_M) & (off < AXIS_RAD + slack))
+        _, angle, angle_sigma = _measure_angles(lines, self.camera, self.mount)
+        slack = np.minimum(3.0 * angle_sigma, 2.0 * AXIS_RAD)
+        kept = np.flatnonzero((far < MAX_SIGHT_M) & (np.abs(_fold(angle + self.heading_rad)) < AXIS_RAD + slack))
         across = np.where(np.abs(step[:, 0]) > np.abs(step[:, 1]), 1, 0)
         rows = [i for i in kept if self._is_foot(lines.segments_px[i], floors)]
         across, ends = across[rows], ends[rows]
@@ -172,14 +171,6 @@ class AxisView:
         low, high = np.sort(ends[pick, :, 1 - across], axis=1).T + self.forward_m[1 - across]
         parts = (side, offset + self.forward_m[across], np.hypot(sigma, 0.003), low, high)
         return [Foot(*foot) for foot in zip(*(part.tolist() for part in parts), strict=True)]
-
-    def _floor_angle_sigma(self, lines: LineSegments) -> Floats:
-        """(n,) deviation of a segment's direction on the floor [rad]."""
-        ends = _to_floor(lines.segments_px, self)
-        turned = _to_floor(_turn(lines.segments_px, lines.sigma_angle_rad), self)
-        a, b = ends[:, 1] - ends[:, 0], turned[:, 1] - turned[:, 0]
-        change = np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], np.sum(a * b, axis=1))
-        return np.asarray(np.nan_to_num(np.abs(change), nan=math.pi))
 
     def _is_foot(self, segment: Floats, floors: Sequence[FloorLooks]) -> bool:
         """Whether there is floor below a segment and none above it."""
@@ -202,9 +193,7 @@ class AxisView:
         """The upright lines."""
         lines = self.lines.take(self.lines.lengths_px >= MIN_UPRIGHT_PX)
         rays = _robot_rays(lines.segments_px, self.camera, self.mount)
-        normal = np.cross(rays[:, 0], rays[:, 1])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
-        rows = np.flatnonzero(np.abs(normal[:, 2]) < UPRIGHT_TILT)
+        rows = np.flatnonzero(np.abs(_normals(rays)[:, 2]) < UPRIGHT_TILT)
         lines, rays = lines.take(rows), rays[rows]
         level = np.linalg.norm(rays[..., :2], axis=2)
         slope = np.sort(rays[..., 2] / level, axis=1)
@@ -247,17 +236,12 @@ def see_axes(jpeg: bytes, camera: Camera, mount: CameraMount, heading_rad: float
 
 def _refine_axis(lines: LineSegments, camera: Camera, mount: CameraMount, first: float) -> tuple[float, float]:
     """The axes' direction in the robot's frame, modulo a right angle, by all level lines; its deviation."""
-    rays = _robot_rays(lines.segments_px, camera, mount)
-    angle = _level_angle(rays)
-    turned = _level_angle(_robot_rays(_turn(lines.segments_px, lines.sigma_angle_rad), camera, mount))
-    sigma = np.abs(np.mod(turned - angle + RIGHT_RAD / 2.0, RIGHT_RAD) - RIGHT_RAD / 2.0)
-    normal = np.cross(rays[:, 0], rays[:, 1])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
+    normal, angle, sigma = _measure_angles(lines, camera, mount)
     usable = (np.hypot(normal[:, 0], normal[:, 1]) > 0.15) & (np.abs(normal[:, 2]) > 0.05) & np.isfinite(sigma)
     angle, sigma = angle[usable], np.maximum(sigma[usable], math.radians(0.05))
     best, deviation = first, math.inf
     for width in (math.radians(2.0), math.radians(1.0), math.radians(0.6)):
-        off = np.mod(angle - best + RIGHT_RAD / 2.0, RIGHT_RAD) - RIGHT_RAD / 2.0
+        off = _fold(angle - best)
         weight = np.maximum(0.0, 1.0 - (off / (width + sigma)) ** 2) ** 2 / sigma**2
         if weight.sum() <= 0.0 or np.count_nonzero(weight) < 3:
             return best, math.inf
@@ -267,9 +251,23 @@ def _refine_axis(lines: LineSegments, camera: Camera, mount: CameraMount, first:
     return best, math.hypot(deviation, LEAST_HEADING_RAD)
 
 
-def _level_angle(rays: Floats) -> Floats:
+def _measure_angles(lines: LineSegments, camera: Camera, mount: CameraMount) -> tuple[Floats, Floats, Floats]:
+    """Of each segment the normal of its plane with the camera; the direction of the level line in it, modulo a right
+    angle, with its deviation [rad, the robot's frame]."""
+    normal = _normals(_robot_rays(lines.segments_px, camera, mount))
+    turned = _normals(_robot_rays(_turn(lines.segments_px, lines.sigma_angle_rad), camera, mount))
+    angle, other = (np.arctan2(n[:, 0], -n[:, 1]) for n in (normal, turned))
+    return normal, angle, np.abs(_fold(other - angle))
+
+
+def _fold(angle_rad: Floats) -> Floats:
+    """Within half a right angle of 0."""
+    return np.asarray(np.mod(angle_rad + RIGHT_RAD / 2.0, RIGHT_RAD) - RIGHT_RAD / 2.0)
+
+
+def _normals(rays: Floats) -> Floats:
     normal = np.cross(rays[:, 0], rays[:, 1])
-    return np.asarray(np.mod(np.arctan2(normal[:, 0], -normal[:, 1]), RIGHT_RAD))
+    return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None])
 
 
 def _robot_rays(pixels: Floats, camera: Camera, mount: CameraMount) -> Floats:

@@ -8,7 +8,6 @@ of it, in the building as it is.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.generated.floor_plan import as_toml
 from experiments.generated.floors import generated_floor
 from experiments.report import Report
 from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
@@ -35,20 +33,14 @@ from world_models.frames import Pose2
 
 Floats = NDArray[np.float64]
 
-STANDING = ("desk", "bookshelf", "file-cabinet", "cupboard", "rack", "table")
-"""What stands on the floor, and is left out."""
 SAME_ROOM, SAME_DOOR_M, SAME_CORNER_M = 0.7, 0.3, 0.1
 """A room is found whose outline shares so much with the true one, a doorway whose middle is so near, a corner."""
 
 
 def write_bare_floor(folder: Path, seed: int, rooms: int) -> Path:
     """Write a floor with so many rooms along corridors; returns the world file."""
-    data = tomllib.loads(generated_floor(seed, rooms, open_share=1.0, clutter=0.0).text)
-    for locale in data["locales"].values():
-        if "things" in locale:
-            locale["things"] = [thing for thing in locale["things"] if thing["part"] not in STANDING]
     path = folder / f"bare-{seed}.toml"
-    path.write_text(as_toml(data), "utf-8")
+    path.write_text(generated_floor(seed, rooms, open_share=1.0, clutter=0.0).bare.text, "utf-8")
     return path
 
 

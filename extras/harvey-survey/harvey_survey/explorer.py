@@ -251,15 +251,13 @@ class Explorer:
         self.floor.add_way(self.map.position(0), self.map.position(0), 2.0 * self._blind_m)
         for room in self.map.rooms.values():
             for side in (side for side in range(4) if room.walls[side] is not None):
-                begin, end = np.zeros(2), np.zeros(2)
-                begin[1 - ACROSS[side]], end[1 - ACROSS[side]] = room.span(side)
-                begin[ACROSS[side]] = end[ACROSS[side]] = room.limit(side)
+                begin, end = room.corners(side)
                 self.floor.add_box(begin, end + WALL_M * np.array(OUTWARD[side]), False)
         for door in self.map.doors:
             begin, end = self._across_door(door, 0.0, DOORWAY_M)
-            half = 0.5 * (door.ends_m[1] - door.ends_m[0])
-            along = half * np.abs(np.array(OUTWARD[door.side])[::-1])
-            self.floor.add_box(begin - along, end + along, True)
+            far, along = door.far_ends_m or door.ends_m, 1 - ACROSS[door.side]  # what both sides say is free
+            begin[along], end[along] = max(door.ends_m[0], far[0]), min(door.ends_m[1], far[1])
+            self.floor.add_box(begin, end, True)
 
     @property
     def _blind_m(self) -> float:

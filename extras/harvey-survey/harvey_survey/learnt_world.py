@@ -234,7 +234,7 @@ def _format_room(built: AxisMap, room: LearntRoom, views: Sequence[WallView], fi
     walls: list[str] = []
     things: list[str] = []
     for side, view in enumerate(views):
-        ways = [ends for wall, ends in list_ways(built, room.name) if wall == side]
+        ways = [ends for wall, ends in built.list_ways(room.name) if wall == side]
         colour = view.colour(room.span(side), (0.2, room.height_m - 0.2))
         finish = "unknown" if colour is None else _finish(finishes, f"{room.name}-{SIDES[side]}", colour, side)
         walls.append(f'{SIDES[side]} = "{finish}"')
@@ -249,13 +249,6 @@ def _format_room(built: AxisMap, room: LearntRoom, views: Sequence[WallView], fi
         finish = "none" if strip is None else _finish(finishes, f"{room.name}-{key}", strip, 0)
         lines.append(f'{key} = "{finish}"')
     return "\n".join([*lines, "things = [", *(f"  {thing}," for thing in things), "]"])
-
-
-def list_ways(built: AxisMap, room: str) -> list[tuple[int, tuple[float, float]]]:
-    """The doorways of a room: side, and from where to where along the wall."""
-    own = [(door.side, door.ends_m) for door in built.doors if door.room == room]
-    return [*own, *(((door.side + 2) % 4, door.far_ends_m or door.ends_m) for door in built.doors
-                    if door.behind == room)]
 
 
 def _has_strip(views: Sequence[WallView], up_m: tuple[float, float], beside_m: tuple[float, float]) -> Floats | None:

@@ -89,8 +89,12 @@ class SeenFloor:
         assert self._away is not None
         length_m = float(np.hypot(*(end - begin)))
         at_m = np.arange(0.0, length_m + CELL_M, CELL_M)
-        cells = _cells(begin + at_m[:, None] * (end - begin) / max(length_m, CELL_M))
+        points = begin + at_m[:, None] * (end - begin) / max(length_m, CELL_M)
+        cells = _cells(points)
         spare_m = self._away[cells[:, 0], cells[:, 1]] - self._radius_m
+        for corner, opposite in self._ways:  # between jambs, and just before them
+            low, high = np.minimum(corner, opposite) - self._radius_m, np.maximum(corner, opposite) + self._radius_m
+            spare_m[np.all((points > low) & (points < high), axis=1)] = 0.0
         p = np.select([spare_m < near_m for near_m, _ in TOUCH], [p for _, p in TOUCH])
         return Clearance(at_m[p > 0.0], p[p > 0.0], math.inf)
 

@@ -24,8 +24,7 @@ def _ledger_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_ledger(args: Namespace) -> int:
-    from harvey_survey.ledger import read_ledger
-    from harvey_survey.ledger_output import format_ledger, ledger_json, write_plan
+    from harvey_survey.ledger import format_ledger, ledger_json, read_ledger, write_plan
     from logs.run_directory import open_run
 
     world = load_file(args.file, [])

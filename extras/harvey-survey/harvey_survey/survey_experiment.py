@@ -107,7 +107,8 @@ def survey_building(case: BuildingCase) -> SurveyedBuilding:
     reached = sum(_drive_after(path, better, number) for number, path in enumerate(paths[case.missions :]))
     gone = {e.name for e in ledger.elements if e.name in truth.missing and e.pictures >= EXPECTED}
     return SurveyedBuilding(
-        case.seed, len(looks), truth.measure_all(model, often), truth.measure_all(surveyed, often),
+        case.seed, len(looks), [truth.measure(model, name) for name in often],
+        [truth.measure(surveyed, name) for name in often],
         truth.compare(found), len(gone), len(gone & {c.name for c in changes if c.is_gone}), len(changes),
         sum(truth.is_wrong(change, model, surveyed) for change in changes), reached, case.after)
 
@@ -141,14 +142,10 @@ class SurveyTruth:
         true = displace(specs[0], replace(TRUTH, seed=seed))
         return SurveyTruth(build_world(true.spec), frozenset(true.missing), model)
 
-    def measure_all(self, world: World, names: Sequence[str]) -> list[float]:
-        """How far landmarks of a model are from the truth [m]; walls along their normals."""
-        kinds = {mark.name: mark.kind for mark in self.model.landmarks}
-        return [self.measure(world, name, is_wall=kinds[name] == "wall") for name in names]
-
-    def measure(self, world: World, name: str, *, is_wall: bool) -> float:
+    def measure(self, world: World, name: str) -> float:
+        """How far a landmark of a model is from the truth [m]; a wall along its normal."""
         own, true = world.landmark(name).lines_world, self.world.landmark(name).lines_world
-        if not is_wall:
+        if self.model.landmark(name).kind != "wall":
             return float(np.linalg.norm((true - own).mean(axis=(0, 1))))
         flat = np.ptp(own.reshape(-1, 3)[:, :2], axis=0)
         across = int(np.argmin(flat))
@@ -183,16 +180,15 @@ class SurveyTruth:
         if change.kind == "wall":
             room, _, number = change.name.rpartition(WALL)
             i = int(number)
-            true, before, after = (world.outline(room)[i : i + 2].mean(axis=0)
-                                   for world in (self.world, model, surveyed))
-            along = model.outline(room)[(i + 1) % len(model.outline(room))] - model.outline(room)[i]
-            across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+            true, before, after = (world.outline(room)[i] for world in (self.world, model, surveyed))
+            along = np.roll(model.outline(room), -1, axis=0)[i] - before
+            across = np.array([-along[1], along[0]])
             return abs(float((after - true) @ across)) >= abs(float((before - true) @ across))
         if change.name in self.missing:
             return True
         names = [mark.name for mark in model.landmarks]
         name = next(name for name in names if name == change.name or name.endswith(f"/{change.name}"))
-        return self.measure(surveyed, name, is_wall=False) >= self.measure(model, name, is_wall=False)
+        return self.measure(surveyed, name) >= self.measure(model, name)
 
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:

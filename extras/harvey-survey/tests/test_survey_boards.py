@@ -12,7 +12,7 @@ from PIL import Image
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey_survey.board_pictures import Boards, calibrate_camera, find_boards, picture_files, save_board
+from harvey_survey.board_pictures import Boards, calibrate_camera, find_boards, save_board
 from harvey_survey.calibrate_experiment import CAMERA, PATTERN, board_picture, board_renderer, board_view
 from harvey_survey.intrinsics import BoardView, Calibration, calibrate, estimate_mounting, find_board
 from knowledge_sources.methods.features import read_picture
@@ -22,7 +22,7 @@ from world_models.camera import CameraDeviation, CameraMount
 from world_models.files.toml.camera_file import load_camera
 from world_models.frames import Pose
 
-TRUE = np.array([CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy, *CAMERA.distortion])
+TRUE = np.array([402.0, 405.0, 250.3, 259.1, -0.2, 0.05, 0.001, -0.0005])
 VIEWS = 10
 
 
@@ -93,13 +93,6 @@ def test_a_camera_of_no_use_by_its_own_deviations_is_refused(views: list[BoardVi
     with pytest.raises(BadInput, match=told):
         calibrate_camera(Boards(tuple(upright), np.zeros((512, 512), np.uint8), (512, 512), ()), PATTERN, with_k3=False)
     assert np.all(calibrate(views[:5], PATTERN, (512, 512)).deviations[:4] < 3.0)
-
-
-def test_pictures_of_a_folder_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
-    for name in ("b10", "b2", "b1", "b100"):
-        (tmp_path / f"{name}.jpg").touch()
-    for given in (str(tmp_path), str(tmp_path / "b*.jpg")):
-        assert [path.stem for path in picture_files([given])] == ["b1", "b2", "b10", "b100"]
 
 
 @pytest.mark.parametrize("ending", ["png", "pdf"])
