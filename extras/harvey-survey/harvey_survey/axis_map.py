@@ -201,9 +201,8 @@ class AxisMap:
 
     def read_through(self, stand: int, room: str, floors: Sequence[FloorLooks]) -> None:
         """Pair the feet of walls that a stand saw through a doorway with those of the room behind, known since."""
-        for view in self.stands[stand].views:
-            for foot in view.find_feet(floors):
-                self._pair_foot(self.rooms[room], stand, foot, False)
+        for foot in (foot for view in self.stands[stand].views for foot in view.find_feet(floors)):
+            self._pair_foot(self.rooms[room], stand, foot, False)
         self.solve()
 
     def list_ways(self, room: str) -> list[tuple[int, tuple[float, float]]]:

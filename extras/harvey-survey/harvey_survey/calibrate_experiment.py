@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.generated.scenes import Patch, PatchFace
+from experiments.generated.scenes import build_print
 from experiments.report import Cell, Report
 from harvey_survey.intrinsics import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_board
 from knowledge_sources.methods.features import read_picture
@@ -25,39 +24,12 @@ from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from world_models.camera import Camera
 from world_models.frames import Pose
 
-UNIFORM_SCALE_M = 1e6
-"""Texture scale at which a plain surface has one colour."""
-WHITE, BLACK, WALL = (0.75, 0.75, 0.75), (0.05, 0.05, 0.05), (0.4, 0.4, 0.4)
 
-
-def board_renderer(pattern: Pattern, samples: int = 8) -> Renderer:
+def board_renderer(pattern: Pattern) -> Renderer:
     """A renderer of a calibration board, in its own frame, before a wall. It is seen from z < 0."""
     is_black = pattern.draw() == 0
-    pixel_m = pattern.square_m * (pattern.columns + 1) / is_black.shape[1]
-
-    def rectangle(x0: float, y0: float, x1: float, y1: float) -> Any:
-        return pixel_m * np.array([(x0, y0, 0.0), (x0, y1, 0.0), (x1, y1, 0.0), (x1, y0, 0.0)])
-
-    high, wide = is_black.shape
-    margin = wide // (pattern.columns + 1)
-    paper = Patch("paper", rectangle(-margin, -margin, wide + margin, high + margin), WHITE, "plain", UNIFORM_SCALE_M)
-    black = [Patch(f"{number}", rectangle(*block), BLACK, "plain", UNIFORM_SCALE_M)
-             for number, block in enumerate(_find_blocks(is_black))]
-    far_m = [(-40.0, -40.0, 9.0), (-40.0, 40.0, 9.0), (40.0, 40.0, 9.0), (40.0, -40.0, 9.0)]
-    wall = Patch("wall", far_m, WALL, "plain", UNIFORM_SCALE_M)
-    return Renderer.of_faces((PatchFace((wall,)), PatchFace((paper, *black))), samples)
-
-
-def _find_blocks(is_black: NDArray[np.bool_]) -> list[tuple[int, int, int, int]]:
-    """Rectangles (left, top, right, bottom) that make up what is black: a run of a row, with the same below it."""
-    blocks: list[tuple[int, int, int, int]] = []
-    began = dict[tuple[int, int], int]()
-    for y, row in enumerate([*is_black, np.zeros_like(is_black[0])]):
-        edges = np.flatnonzero(np.diff(row.astype(int), prepend=0, append=0)).tolist()
-        runs = set(zip(edges[::2], edges[1::2], strict=True))
-        blocks += [(left, began.pop((left, right)), right, y) for left, right in began.keys() - runs]
-        began |= dict.fromkeys(runs - began.keys(), y)
-    return blocks
+    margin_px = is_black.shape[1] // (pattern.columns + 1)
+    return Renderer.of_faces(build_print(is_black, pattern.square_m / margin_px, margin_px), 8)
 
 
 def board_view(camera: Camera, pattern: Pattern, rng: np.random.Generator) -> Pose:

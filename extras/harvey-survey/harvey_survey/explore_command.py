@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from sim.stage import Stage
 
 
+EXAMPLE = "runs/experiments/explore/quick-0/floor-610000/bare-610000.toml"
+
+
 def format_explored(world: Path, ends: Sequence[tuple[str, float, float]], heading_deg: float) -> str:
     """A scenario from one place to another: room, x and y [m, the room's frame]."""
     from world_models.units import FOOT_M
@@ -97,9 +100,9 @@ def _run(args: Namespace) -> int:
 
 EXPLORE = CliCommand(
     "explore", "a world file of a building of which the robot is told nothing",
-    (("harvey explore --world two_ways --start north-hall --out mine.toml --plan mine.png", "look round, drive, home"),
-     ("harvey world check mine.toml", "what it has found"),
-     ("harvey experiment explore --quick", "how well, on a drawn floor")),
+    (("harvey experiment explore --quick", "draws a bare floor, in runs/experiments/explore; how well it is explored"),
+     (f"harvey explore --world {EXAMPLE} --start room-0-north-0 --out mine.toml", "look round, drive, home"),
+     ("harvey world check mine.toml", "what it has found")),
     _arguments, _run,
     details="""
 It looks round and finds the feet of walls, uprights and the floor; a doorway is where floor is seen behind a wall. Then
@@ -107,6 +110,7 @@ it goes where most is not known: floor of the room that it has not seen, what is
 floor that it has seen, and comes home by the map that it has made. What it writes is a world file: rooms, doorways,
 boards on walls with their colours. Its origin is the start, its axes are those of the building.
 
-It takes rooms for rectangles with walls along two directions, bare of furniture, and doorways for open; a shut door is
-a piece of wall. When it touches something it stops, writes what it knows, and ends with exit code 1.
+Today it is for bare rooms with open doors: it takes rooms for rectangles with walls along two directions, and does not
+see what stands in them; in two_ways it touches a table. A shut door is a piece of wall. The first example draws such a
+floor; its doorways are not always all found. When it touches something it stops, writes what it knows, exit code 1.
 """)

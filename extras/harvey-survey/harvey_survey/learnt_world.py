@@ -160,8 +160,8 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
         (r0, r1), (c0, c1) = box
         if r1 >= int((height_m - MOULDING_HEIGHT_M - 0.06) / PIXEL_M) or min(r0, c0) <= 0:
             continue
-        if not usable[r0:r1, c0:c1].all() or _touches(usable, box):
-            continue
+        if not usable[max(0, r0 - 2) : r1 + 2, max(0, c0 - 2) : c1 + 2].all():
+            continue  # it ends at what was not seen, and may go on there
         rim = max(1, int(RIM_M / PIXEL_M) // 2)
         border = np.concatenate([smooth[r0 + 1 : r0 + 1 + rim, c0:c1].reshape(-1, 3),
                                  smooth[r0:r1, c0 + 1 : c0 + 1 + rim].reshape(-1, 3),
@@ -175,14 +175,6 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
         boards.append([Board((wall.start_m + a * PIXEL_M, wall.start_m + b * PIXEL_M), (low * PIXEL_M, high * PIXEL_M),
                              colour) for ((low, high), (a, b)), colour in [(box, outer), *inner]])
     return boards
-
-
-def _touches(usable: Mask, box: tuple[tuple[int, int], tuple[int, int]]) -> bool:
-    """Whether a rectangle ends at what was not seen: it may go on there."""
-    (r0, r1), (c0, c1) = box
-    rows, columns = usable.shape
-    around = usable[max(0, r0 - 2) : min(rows, r1 + 2), max(0, c0 - 2) : min(columns, c1 + 2)]
-    return not bool(around.all())
 
 
 def _find_boxes(mask: Mask) -> list[tuple[tuple[int, int], tuple[int, int]]]:

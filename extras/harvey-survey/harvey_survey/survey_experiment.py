@@ -17,11 +17,10 @@ from experiments.generated.missions import write_inexact_mission
 from experiments.report import Report
 from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
 from harvey.simulation.simulated_run import build_head, run_mission
-from harvey_survey.adjustment import Adjustment, adjust
+from harvey_survey.adjustment import Adjustment, SurveyChange, adjust, propose_changes
 from harvey_survey.ledger import build_ledger
 from harvey_survey.patch_file import build_patch, write_world
 from harvey_survey.seen_pictures import read_looks
-from harvey_survey.survey_changes import SurveyChange, propose_changes
 from logs.run_directory import RunDirectory
 from sim.ground_truth.inexact import TrueInexact, displace
 from sim.scenario import parse_scenario

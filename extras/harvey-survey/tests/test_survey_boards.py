@@ -107,24 +107,19 @@ def test_the_board_is_printed_as_it_is_looked_for(tmp_path: Path, ending: str) -
         save_board(tmp_path / "board.xyz", PATTERN)
 
 
-def standing(height_m: float, tilt_rad: float, lowest_m: float, ahead_m: float) -> Pose:
-    """An upright board square before the robot: x to its right, y down."""
-    rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-    board = Pose(rotation, np.array([ahead_m, 4 * 0.025, lowest_m + 5 * 0.025]))
-    return CameraMount(height_m, 0.08, tilt_rad).camera_from_robot @ board
-
-
-def lying(height_m: float, tilt_rad: float, ahead_m: float) -> Pose:
-    """A board on the floor, square before the robot: x to its right, y towards it."""
-    rotation = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-    board = Pose(rotation, np.array([ahead_m + 5 * 0.025, 4 * 0.025, 0.0]))
+def placed(height_m: float, tilt_rad: float, upright: bool) -> Pose:
+    """A board half a metre before the robot, square to it: upright, its y down, or lying, its y towards it."""
+    turn = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    lying = [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
+    place = [0.5, 4 * 0.025, 0.06 + 5 * 0.025] if upright else [0.5 + 5 * 0.025, 4 * 0.025, 0.0]
+    board = Pose(np.array(turn if upright else lying), np.array(place))
     return CameraMount(height_m, 0.08, tilt_rad).camera_from_robot @ board
 
 
 @pytest.mark.parametrize("upright", [True, False])
 def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> None:
     tilt = math.radians(4.0 if upright else 28.0)
-    pose = standing(0.22, tilt, 0.06, 0.5) if upright else lying(0.3, tilt, 0.5)
+    pose = placed(0.22 if upright else 0.3, tilt, upright)
     rng = np.random.default_rng(4)
     picture = board_picture(board_renderer(PATTERN), Optics.of(CAMERA), pose, SensorParameters(), rng)
     found = estimate_mounting(calibration, seen(picture), PATTERN, standing_at_m=0.06 if upright else None)
@@ -135,7 +130,7 @@ def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> Non
 
 
 def test_a_board_nowhere_near_the_floor_is_refused(calibration: Calibration) -> None:
-    view = BoardView("", CAMERA.project(standing(0.2, 0.0, 0.06, 0.5).apply(PATTERN.points)), np.arange(35))
+    view = BoardView("", CAMERA.project(placed(0.2, 0.0, True).apply(PATTERN.points)), np.arange(35))
     with pytest.raises(ValueError, match="expected a board upright before the camera, got one that puts it -"):
         estimate_mounting(calibration, view, PATTERN, standing_at_m=-1.0)
 

@@ -12,11 +12,9 @@ import pytest
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey_survey.adjustment import adjust
-from harvey_survey.patch_file import build_patch, format_patch, read_patch, write_world
+from harvey_survey.adjustment import SurveyChange, adjust, find_gone, propose_changes, weigh_gone
+from harvey_survey.patch_file import apply_changes, build_patch, format_patch, read_patch, write_world
 from harvey_survey.seen_pictures import SeenPicture, read_looks
-from harvey_survey.survey_changes import SurveyChange, find_gone, propose_changes, weigh_gone
-from harvey_survey.text_edits import apply_changes
 from world_models.building.model_errors import find_line_errors
 from world_models.building.world import World
 from world_models.files.world_files import WORLDS, load_world

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.generated.missions import write_inexact_mission
-from harvey_survey.survey_changes import SurveyChange
+from harvey_survey.adjustment import SurveyChange
 from harvey_survey.survey_experiment import ROOMS, SIGMA_M, TRUTH, SurveyedBuilding, SurveyTruth, report
 from world_models.files.world_files import load_world
 
