@@ -1,4 +1,4 @@
-"""Adjustment over runs: where walls, doors and things are, by all pictures of verified places at once.
+"""Adjustment over runs: where walls, doors and things are, by all pictures at once; and changes of the model with odds.
 
 Unknown are the robot's pose of each picture, the camera of each run, and the amplitude of each mode of the model
 (:mod:`world_models.building.model_errors`): walls along their normals, doors along their walls, things. They are found

@@ -133,8 +133,7 @@ class Explorer:
     def go_home(self) -> bool:
         """To the start and to the heading there; whether it got there."""
         arrived = self._go_to(cell_of(self.map.position(0)))
-        last = self.map.position(0) - self.here
-        if arrived and float(np.hypot(*last)) > 0.02:
+        if arrived and float(np.hypot(*(self.map.position(0) - self.here))) > 0.02:
             self._drive(self.map.position(0))
         self._turn_to(self.start_rad)
         return arrived
@@ -263,8 +262,7 @@ class Explorer:
     def _blind_m(self) -> float:
         """How far the nearest floor is that the picture shows [m]."""
         views = [view for view in self.map.stands[0].views if np.isfinite(view.polar).any()]
-        nearest = min(float(view.distances_m[np.isfinite(view.polar[..., 0]).any(axis=0)][0]) for view in views)
-        return nearest + 0.15
+        return 0.15 + min(float(view.distances_m[np.isfinite(view.polar[..., 0]).any(axis=0)][0]) for view in views)
 
     def _across_door(self, door: LearntDoor, before_m: float, behind_m: float) -> tuple[Floats, Floats]:
         """A point before a doorway and one behind it."""
@@ -297,9 +295,8 @@ class Explorer:
             x0, y0, x1, y1 = room.box
             (i0, j0), (i1, j1) = cell_of((x0 + 0.1, y0 + 0.1)), cell_of((x1 - 0.1, y1 - 0.1))
             unseen = np.argwhere(~seen[i0:i1, j0:j1]) + np.array([i0, j0])
-            spots = [cell for cell in costs if i0 <= cell[0] < i1 and j0 <= cell[1] < j1
-                     and cell[0] % 6 == 0 and cell[1] % 6 == 0]
             been = [self.map.position(n) for n, stand in enumerate(self.map.stands) if len(stand.views) >= LOOKS - 2]
+            spots = [(i, j) for i, j in costs if i0 <= i < i1 and j0 <= j < j1 and i % 6 == j % 6 == 0]
             spots = [cell for cell in spots if not any(
                 np.hypot(*(point_of(cell) - point)) < LOOKED_M for point in (*self._given_up, *been))]
             if not spots:
@@ -341,11 +338,8 @@ class Explorer:
         else:
             self._tell("  no floor is seen behind it")
             return
-        known = self.map.room_at(inside)
-        if known is not None:
-            door.behind = known
-            return
-        if not self._go_to(cell):
+        door.behind = self.map.room_at(inside)
+        if door.behind is not None or not self._go_to(cell):
             return
         views = self._look_round()
         name = f"room-{len(self.map.rooms) + 1}"

@@ -1,4 +1,4 @@
-"""Camera calibration from views of a ChArUco board, as OpenCV does it: corners, intrinsics, distortion, deviations.
+"""Camera calibration from views of a ChArUco board, as OpenCV does it, with deviations; and the mounting, by one view.
 
 A ChArUco board is a chessboard with a marker in each white square. So every inner corner has a number, and a view of a
 part of the board is of use. Source: Z. Zhang, A flexible new technique for camera calibration, PAMI 22(11), 2000.

@@ -156,8 +156,7 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
     ground = np.median(smooth[usable], axis=0)
     unlike = usable & (np.abs(smooth - ground).max(axis=2) > UNLIKE)
     boards = []
-    for box in _find_boxes(unlike):
-        (r0, r1), (c0, c1) = box
+    for (r0, r1), (c0, c1) in _find_boxes(unlike):
         if r1 >= int((height_m - MOULDING_HEIGHT_M - 0.06) / PIXEL_M) or min(r0, c0) <= 0:
             continue
         if not usable[max(0, r0 - 2) : r1 + 2, max(0, c0 - 2) : c1 + 2].all():
@@ -173,7 +172,7 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
         inner = [((rows, columns), np.median(smooth[slice(*rows), slice(*columns)].reshape(-1, 3), axis=0))
                  for rows, columns in _find_boxes(differs)[:1]]
         boards.append([Board((wall.start_m + a * PIXEL_M, wall.start_m + b * PIXEL_M), (low * PIXEL_M, high * PIXEL_M),
-                             colour) for ((low, high), (a, b)), colour in [(box, outer), *inner]])
+                             colour) for ((low, high), (a, b)), colour in [(((r0, r1), (c0, c1)), outer), *inner]])
     return boards
 
 

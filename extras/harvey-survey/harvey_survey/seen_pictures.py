@@ -1,4 +1,4 @@
-"""Looks: of each picture by which a place was verified, what a run's journal says was expected and found.
+"""Looks: of each picture by which a place was verified, what a journal says was expected and found; and how far off.
 
 A run may have believed that a wall or a door stands elsewhere than its file says. All lines of a look are those of the
 file: what the run had moved is moved back.

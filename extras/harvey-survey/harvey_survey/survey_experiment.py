@@ -185,9 +185,8 @@ class SurveyTruth:
             return abs(float((after - true) @ across)) >= abs(float((before - true) @ across))
         if change.name in self.missing:
             return True
-        names = [mark.name for mark in model.landmarks]
-        name = next(name for name in names if name == change.name or name.endswith(f"/{change.name}"))
-        return self.measure(surveyed, name) >= self.measure(model, name)
+        names = (mark.name for mark in model.landmarks if f"/{mark.name}".endswith(f"/{change.name}"))
+        return self.measure(surveyed, name := next(names)) >= self.measure(model, name)
 
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
@@ -208,8 +207,8 @@ def report(ends: Sequence[SurveyedBuilding]) -> Report:
         [(e.gone, e.gone_found, e.changes, e.wrong, e.reached, e.driven) for e in ends], axis=0).tolist()
     held = int(np.count_nonzero(z <= WITHIN_95))
     rows = [(f"floor {e.seed}", e.pictures, len(e.after_m), *_spread_cm(e.before_m), *_spread_cm(e.after_m),
-             _share(np.abs(e.z) <= WITHIN_95), f"{e.gone_found}/{e.gone}", f"{e.wrong}/{e.changes}",
-             f"{e.reached}/{e.driven}") for e in ends]
+             f"{np.mean(np.abs(e.z) <= WITHIN_95):.0%}" if e.z else "-", f"{e.gone_found}/{e.gone}",
+             f"{e.wrong}/{e.changes}", f"{e.reached}/{e.driven}") for e in ends]
     median_m, most_m = (float(np.percentile(after, part)) if after else 0.0 for part in (50, 95))
     return Report(
         "Surveys of buildings whose models are wrong by 5 cm a thing, 15 % gone",
@@ -238,8 +237,4 @@ def report(ends: Sequence[SurveyedBuilding]) -> Report:
 
 def _spread_cm(errors_m: Sequence[float]) -> tuple[float, float]:
     return (float(100.0 * np.median(errors_m)), float(100.0 * np.percentile(errors_m, 95))) if errors_m else (0.0, 0.0)
-
-
-def _share(held: NDArray[np.bool_]) -> str:
-    return f"{np.mean(held):.0%}" if len(held) else "-"
 
