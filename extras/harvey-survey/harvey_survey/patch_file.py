@@ -1,4 +1,4 @@
-"""Patch files: changes of a world file, one a table, and the file with those accepted, each number written in its place.
+"""Patch files: changes of a world file, one a table, and the file with those accepted: numbers are written in place.
 
 A patch is made of one world file, whose digest it names. The file that a patch makes is always made of that file and
 the changes that are accepted: so a change that is undone leaves nothing behind.
