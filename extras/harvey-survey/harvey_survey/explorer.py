@@ -72,7 +72,7 @@ class ExploringStopped(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Goal:
+class ExploringGoal:
     """Where to go for what: a doorway to look through, or None: to look round in a room."""
 
     cell: Cell
@@ -273,23 +273,23 @@ class Explorer:
 
     # -- choosing --------------------------------------------------------------------------------------------------
 
-    def _choose(self) -> Goal | None:
+    def _choose(self) -> ExploringGoal | None:
         costs, _ = self.floor.costs_from(self.here)
         goals = [*self._door_goals(costs), *self._room_goals(costs)]
         return min(goals, key=lambda goal: goal.cost) if goals else None
 
-    def _door_goals(self, costs: dict[Cell, float]) -> list[Goal]:
+    def _door_goals(self, costs: dict[Cell, float]) -> list[ExploringGoal]:
         goals = []
         for door in self.map.doors:
             if door.behind is None and door.tried < 2:
                 for before_m in (BEFORE_DOOR_M, 1.7, 1.5, 1.2, 0.9):
                     cell = near_cell(self._across_door(door, before_m, 0.0)[0], costs, 3)
                     if cell is not None:
-                        goals.append(Goal(cell, costs[cell] + 3.0, door, f"a doorway of {door.room}"))
+                        goals.append(ExploringGoal(cell, costs[cell] + 3.0, door, f"a doorway of {door.room}"))
                         break
         return goals
 
-    def _room_goals(self, costs: dict[Cell, float]) -> list[Goal]:
+    def _room_goals(self, costs: dict[Cell, float]) -> list[ExploringGoal]:
         goals, seen = [], self.floor.seen
         for room in self.map.rooms.values():
             x0, y0, x1, y1 = room.box
@@ -306,12 +306,12 @@ class Explorer:
             gains = [_gain(cell, unseen) + UNREAD_M2 * _count_read(room, point_of(cell), unread) for cell in spots]
             best = max(range(len(spots)), key=lambda k: gains[k] - COST_PER_M2 * costs[spots[k]])
             if gains[best] > enough:
-                goals.append(Goal(spots[best], costs[spots[best]], None, f"{room.name} is not seen whole"))
+                goals.append(ExploringGoal(spots[best], costs[spots[best]], None, f"{room.name} is not seen whole"))
             for side in (side for side in range(4) if room.walls[side] is None):
                 out = np.array(OUTWARD[side])
                 far = max(spots, key=lambda cell: float(point_of(cell) @ out))
                 if float((point_of(far) - self.here) @ out) > 0.8:
-                    goals.append(Goal(far, costs[far] + 1.0, None, f"{room.name} goes on"))
+                    goals.append(ExploringGoal(far, costs[far] + 1.0, None, f"{room.name} goes on"))
         return goals
 
     # -- moving ----------------------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ SIGMA_CM = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Board:
+class WallBoard:
     """A rectangle on a wall: from where to where along it and up [m], and its colour (3,) 0..255."""
 
     along_m: tuple[float, float]
@@ -140,7 +140,7 @@ def measure_height(built: AxisMap, room: LearntRoom) -> float:
     return float(np.average(at[near], weights=weight[near]))
 
 
-def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, float]]) -> list[list[Board]]:
+def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, float]]) -> list[list[WallBoard]]:
     """The rectangles on a wall that differ from it, outside its doorways, each with that which is on it."""
     columns = wall.seen.shape[1]
     usable = wall.seen.copy()
@@ -171,8 +171,9 @@ def find_boards(wall: WallView, height_m: float, doors: Sequence[tuple[float, fl
             np.abs(smooth[r0 + 1 : r1 - 1, c0 + 1 : c1 - 1] - outer).max(axis=2) > UNLIKE)
         inner = [((rows, columns), np.median(smooth[slice(*rows), slice(*columns)].reshape(-1, 3), axis=0))
                  for rows, columns in _find_boxes(differs)[:1]]
-        boards.append([Board((wall.start_m + a * PIXEL_M, wall.start_m + b * PIXEL_M), (low * PIXEL_M, high * PIXEL_M),
-                             colour) for ((low, high), (a, b)), colour in [(((r0, r1), (c0, c1)), outer), *inner]])
+        every, at = [(((r0, r1), (c0, c1)), outer), *inner], wall.start_m
+        boards.append([WallBoard((at + a * PIXEL_M, at + b * PIXEL_M), (low * PIXEL_M, high * PIXEL_M), colour)
+                       for ((low, high), (a, b)), colour in every])
     return boards
 
 
@@ -254,7 +255,7 @@ def _has_strip(views: Sequence[WallView], up_m: tuple[float, float], beside_m: t
     return np.median(strips, axis=0) if strips and 2 * differ > len(strips) else None
 
 
-def _format_boards(boards: Sequence[Board], side: int, origin_m: float, name: str, finishes: dict[str, str]) -> str:
+def _format_boards(boards: Sequence[WallBoard], side: int, origin_m: float, name: str, finishes: dict[str, str]) -> str:
     middle, up = (0.5 * sum(ends) for ends in (boards[0].along_m, boards[0].up_m))
     out, boxes = OUTWARD[side], list[str]()
     right = (-out[1], out[0])[1 - ACROSS[side]]  # a box's x is to the right of who stands with the back to the wall
