@@ -50,6 +50,7 @@ EXPERIMENTS: Mapping[str, Mapping[str, str]] = {
     },
     "robustness": {
         "crash": "Missions killed at random moments and resumed",
+        "explore": "Unknown floors explored, and missions in the models",
         "imported-building": "Missions between the rooms of a house from IFC",
         "integrity": "One fault a mission: is a pose as near as it says?",
         "kidnap": "Kidnaps to anywhere on generated floors of 40 rooms",

@@ -37,11 +37,11 @@ COMMANDS_GROUP, PAGES_GROUP, CAMERAS_GROUP = "harvey.commands", "harvey.pages", 
 QUESTIONS_GROUP = "harvey.questions"
 WORKERS_GROUP, RENDERERS_GROUP, RUN_EXPORTERS_GROUP = "harvey.workers", "harvey.renderers", "harvey.run_exporters"
 EXTRAS: Mapping[str, Mapping[str, str]] = {
-    COMMANDS_GROUP: {**dict.fromkeys(("calibrate", "survey", "world.ledger"), "harvey-survey"),
+    COMMANDS_GROUP: {**dict.fromkeys(("calibrate", "explore", "survey", "world.ledger"), "harvey-survey"),
                      "follow": "harvey-ros2", "directions": "harvey-words", "parse": "harvey-words",
                      "serve": "harvey-serve", **dict.fromkeys(("world.export", "world.import"), "harvey-buildings")},
     "harvey.experiments": {
-        **dict.fromkeys(("calibrate", "survey"), "harvey-survey"), "driven-ways": "harvey-words",
+        **dict.fromkeys(("calibrate", "explore", "survey"), "harvey-survey"), "driven-ways": "harvey-words",
         "imported-building": "harvey-buildings", "instructions": "harvey-words",
         "other-worlds": "harvey-miniworld", "people": "harvey-people", "rosmaps": "harvey-buildings",
         "watchers": "harvey-serve"},

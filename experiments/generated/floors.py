@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.generated.floor_plan import FloorPlan, as_toml
+from experiments.generated.floor_plan import DEEP, FloorPlan, as_toml
 from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -29,6 +29,8 @@ SURFACES: Mapping[str, tuple[float, float]] = {
     "plain": (1.0, 1.0), "speckle": (0.15, 0.4), "carpet": (0.1, 0.3), "wood": (0.2, 0.8), "brick": (0.4, 1.2),
     "tiles": (0.4, 2.5), "stripes": (0.5, 2.0), "poster": (1.0, 3.0)}
 """Textures of surfaces that no plan tells of, with the least and the largest size of their cells [ft]."""
+STANDING = (*DEEP, "table")
+"""What stands on the floor."""
 NOT_DRAWN = "unknown"
 """The finish of all that a plan says nothing of."""
 
@@ -127,6 +129,15 @@ class Floor:
                 locale[part] = finish
             if rng.random() < 0.5:
                 locale["ceiling"] = locale["walls"]
+        return replace(self, text=as_toml(data))
+
+    @property
+    def bare(self) -> Floor:
+        """The floor without what stands on it."""
+        data = tomllib.loads(self.text)
+        for locale in data["locales"].values():
+            if "things" in locale:
+                locale["things"] = [thing for thing in locale["things"] if thing["part"] not in STANDING]
         return replace(self, text=as_toml(data))
 
     def write(self, folder: Path) -> tuple[Path, Path]:

@@ -127,7 +127,8 @@ WHEELS_WORSE = (
 
 
 def write_inexact_mission(
-    folder: Path, seed: int, truth: TrueInexact, *, stated_m: float = 0.0, more: str = "", rooms: int = ROOMS
+    folder: Path, seed: int, truth: TrueInexact, *, stated_m: float = 0.0, more: str = "", rooms: int = ROOMS,
+    draw: Sequence[int] = (5,), name: str = "inexact",
 ) -> Path:
     """Write a scenario from one room of a generated floor to another, with the floor's files; returns its path.
 
@@ -138,11 +139,12 @@ def write_inexact_mission(
         truth: how inexact the model is; its seed is replaced by ``seed``.
         stated_m: the standard deviation that the world file states.
         more: further tables of the scenario.
+        draw: by which the mission is drawn, on the same floor in the same building. name: of its file.
 
     Raises:
         ValueError: nothing that fits was found.
     """
-    floor, rng = generated_floor(seed, rooms, open_share=1.0), np.random.default_rng([seed, 5])
+    floor, rng = generated_floor(seed, rooms, open_share=1.0), np.random.default_rng([seed, *draw])
     world, details = floor.write(folder)
     if stated_m:
         world.write_text(f"sigma_cm = {100.0 * stated_m:g}\n{world.read_text('utf-8')}", "utf-8")
@@ -158,7 +160,7 @@ def write_inexact_mission(
         except ValueError:
             continue
         if all(is_drivable(s.building.obstacles, s.start_world, s.goal_world) for s in stages):
-            path = folder / f"inexact-{seed}.toml"
+            path = folder / f"{name}-{seed}.toml"
             path.write_text(text + table + more, "utf-8")
             return path
     raise ValueError(f"expected a mission on floor {seed}, got none in {MAX_DRAWS} draws")

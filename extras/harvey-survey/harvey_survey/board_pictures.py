@@ -16,8 +16,16 @@ from PIL import Image
 from harvey.errors import BadInput
 from harvey.hardware.drivers.capture import CameraFault
 from harvey.hardware.drivers.video_camera import VideoCamera
-from harvey_survey.intrinsics import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_board
-from harvey_survey.mounting import Mounting, estimate_mounting
+from harvey_survey.intrinsics import (
+    PARAMETERS,
+    BoardView,
+    Calibration,
+    Mounting,
+    Pattern,
+    calibrate,
+    estimate_mounting,
+    find_board,
+)
 from knowledge_sources.methods.features import read_picture
 from world_models.camera import CameraDeviation, CameraMount
 from world_models.words import by_numbers, count
@@ -30,7 +38,6 @@ SAME_PX = 0.02
 MAX_DEVIATION_PX = 0.01
 """A camera is of no use whose focal length or principal point is not known to this part of the picture's width."""
 ROLLED = math.radians(1.0)
-UNITS = (("fx", "px"), ("fy", "px"), ("cx", "px"), ("cy", "px"))
 PRINTED_TIMES = 10
 """Of the least size at which a board can be drawn: sharp on any printer."""
 Grey = NDArray[np.uint8]
@@ -195,10 +202,9 @@ def report(
 ) -> tuple[str, ...]:
     """Lines for people."""
     c = calibration.camera
-    names = dict(UNITS)
     lines = [f"{c.width} x {c.height} px; {count(len(calibration.views), 'view')} of the board used; "
              f"corners are off by {calibration.rms_px:.3f} px RMS", ""]
-    lines += [f"  {name}  {value:12.6g} +- {sigma:<9.3g} {names.get(name, '')}".rstrip()
+    lines += [f"  {name}  {value:12.6g} +- {sigma:<9.3g} {'px' * (name[0] in 'fc')}".rstrip()
               for name, value, sigma in zip(PARAMETERS, calibration.values, calibration.deviations, strict=False)]
     lines += ["", "RMS error of each view [px]:"]
     lines += [f"  {rms:.3f}  {view.name}" for view, rms in zip(calibration.views, calibration.view_rms_px, strict=True)]
@@ -212,17 +218,17 @@ def report(
 
 
 def _mounting_lines(found: Mounting, board: Mounted) -> tuple[str, ...]:
-    s = found.deviations
-    lines = ["", "mounting:",
-             f"  height  {found.height_m:8.4f} +- {s[0]:.4f} m",
-             f"  tilt    {math.degrees(found.tilt_rad):8.3f} +- {math.degrees(s[1]):.3f} degrees, downward",
-             f"  roll    {math.degrees(found.roll_rad):8.3f} +- {math.degrees(s[2]):.3f} degrees, clockwise",
-             f"  board   {found.to_board_m:8.4f} +- {s[3]:.4f} m ahead of the camera"]
+    height, tilt, roll, away, yaw = found.deviations.tolist()
+    rows = [("height", found.height_m, height, "m"), ("tilt", found.tilt_rad, tilt, "degrees, downward"),
+            ("roll", found.roll_rad, roll, "degrees, clockwise"),
+            ("board", found.to_board_m, away, "m ahead of the camera")]
     if board.board_ahead_m is not None:
-        forward = board.board_ahead_m - found.to_board_m
-        lines += [f"  forward {forward:8.4f} +- {s[3]:.4f} m, and what the tape measure errs",
-                  f"  yaw     {math.degrees(found.yaw_rad):8.3f} +- {math.degrees(s[4]):.3f} degrees to the left, if "
-                  "the board was square to the robot"]
+        rows += [("forward", board.board_ahead_m - found.to_board_m, away, "m, and what the tape measure errs"),
+                 ("yaw", found.yaw_rad, yaw, "degrees to the left, if the board was square to the robot")]
+    lines = ["", "mounting:"]
+    for name, value, sigma, unit in rows:
+        times = math.degrees(1.0) if unit.startswith("degrees") else 1.0
+        lines.append(f"  {name:7} {times * value:8.4f} +- {times * sigma:.4f} {unit}")
     for name, angle in (("roll", found.roll_rad), ("yaw", found.yaw_rad if board.board_ahead_m is not None else 0.0)):
         if abs(angle) > ROLLED:
             lines.append(f"  the camera file has no {name}: turn the camera until this is below 1 degree")

@@ -16,11 +16,9 @@ if TYPE_CHECKING:
     from harvey_survey.board_pictures import Boards, Grey, Mounted
     from harvey_survey.intrinsics import Calibration, Pattern
 
-PATTERN = re.compile(r"(\d{1,3})x(\d{1,3})", re.ASCII)
-
 
 def _pattern(text: str) -> tuple[int, int]:
-    match = PATTERN.fullmatch(text)
+    match = re.fullmatch(r"(\d{1,3})x(\d{1,3})", text, re.ASCII)
     if match is None:
         raise ArgumentTypeError(f"expected inner corners as 7x5, got {text!r}")
     return int(match[1]), int(match[2])

@@ -14,14 +14,50 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from experiments.generated.scenes import build_print
 from experiments.report import Cell, Report
 from harvey_survey.intrinsics import PARAMETERS, BoardView, Calibration, Pattern, calibrate, find_board
-from harvey_survey.rendered_boards import board_picture, board_renderer, board_view
 from knowledge_sources.methods.features import read_picture
 from sim.render.optics import Optics
 from sim.render.renderer import Renderer
-from sim.render.sensor import SensorParameters
+from sim.render.sensor import SensorParameters, compress_jpeg, expose
 from world_models.camera import Camera
+from world_models.frames import Pose
+
+
+def board_renderer(pattern: Pattern) -> Renderer:
+    """A renderer of a calibration board, in its own frame, before a wall. It is seen from z < 0."""
+    is_black = pattern.draw() == 0
+    margin_px = is_black.shape[1] // (pattern.columns + 1)
+    return Renderer.of_faces(build_print(is_black, pattern.square_m / margin_px, margin_px), 8)
+
+
+def board_view(camera: Camera, pattern: Pattern, rng: np.random.Generator) -> Pose:
+    """A random ``camera_from_board``, as a person holds a board.
+
+    The board is 35 % to 80 % as wide as the picture, tilted by up to 45 degrees, turned a little, and wholly visible.
+    """
+    wide_m, high_m = pattern.square_m * (pattern.columns + 1), pattern.square_m * (pattern.rows + 1)
+    outer = np.array([(x, y, 0.0) for x in (0.0, wide_m) for y in (0.0, high_m)])
+    while True:
+        way, tilt, turn = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, 0.8), rng.normal(0.0, 0.15)
+        leaning = Pose.from_rotation_vector(tilt * np.array([math.cos(way), math.sin(way), 0.0]), np.zeros(3))
+        turned = Pose.from_rotation_vector(np.array([0.0, 0.0, turn]), np.zeros(3))
+        depth_m = camera.fx * wide_m / (camera.width * rng.uniform(0.35, 0.8))
+        aside = camera.rays(rng.uniform(0.1, 0.9, 2) * (camera.width, camera.height)) * depth_m
+        there = leaning @ turned
+        pose = Pose(there.rotation, aside - there.rotation @ outer.mean(axis=0))
+        shown = pose.apply(outer)
+        if np.all(shown[:, 2] > 0.1) and np.all(camera.inside(camera.project(shown), 4.0)):
+            return pose
+
+
+def board_picture(
+    renderer: Renderer, optics: Optics, camera_from_board: Pose, sensor: SensorParameters, rng: np.random.Generator
+) -> bytes:
+    """The JPEG bytes of a picture of the board."""
+    return compress_jpeg(expose(optics.radiance(renderer, camera_from_board), sensor, rng), sensor.jpeg_quality)
+
 
 PATTERN = Pattern(7, 5, 0.025)
 CAMERA = Camera(402.0, 405.0, 250.3, 259.1, 512, 512, (-0.2, 0.05, 0.001, -0.0005))

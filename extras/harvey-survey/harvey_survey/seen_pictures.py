@@ -1,4 +1,4 @@
-"""Looks: of each picture by which a place was verified, what a run's journal says was expected and found.
+"""Looks: of each picture by which a place was verified, what a journal says was expected and found; and how far off.
 
 A run may have believed that a wall or a door stands elsewhere than its file says. All lines of a look are those of the
 file: what the run had moved is moved back.
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.calibration import compute_camera_covariance
+from knowledge_sources.methods.features import SIGMA_ACROSS_PX
 from logs.run_directory import RunDirectory
 from logs.run_errors import BadInput
 from logs.run_head import RunHead
@@ -24,7 +25,7 @@ from logs.timeline import Timeline
 from world_models.building.geometry.landmarks import Landmark
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.world import World
-from world_models.camera import Camera, CameraMount
+from world_models.camera import Camera, CameraMount, move_camera
 from world_models.entries import (
     CameraState,
     Certificate,
@@ -43,6 +44,7 @@ Floats = NDArray[np.float64]
 READ = (CameraState, Certificate, Hypothesis, LineMatch, Milestone, Obstacle, PoseFix, Segments)
 SAME_LINE_M = 0.002
 """A visible piece lies no further than this from the line of which it is a piece [m]."""
+LIGHTS = ("dark", "middling", "bright")
 FOUND = 0.5
 """A line of which more than this part is accounted for is found."""
 
@@ -204,4 +206,82 @@ class _Reader:
 
 def light_of(look: SeenPicture) -> str:
     """``dark``, ``middling`` or ``bright``, by thirds of what a picture can show."""
-    return ("dark", "middling", "bright")[min(2, math.floor(look.brightness / 256.0 * 3.0))]
+    return LIGHTS[min(2, math.floor(look.brightness / 256.0 * 3.0))]
+
+
+STEPS, MOVE_M = (1e-4, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5, 1e-4, 1e-5, 1e-2, 1e-2), 1e-4
+"""Steps of pose, camera and lines by which slopes are measured, in the units of what is off."""
+SIGMA_PX = SIGMA_ACROSS_PX
+"""Standard deviation of a segment's end across its line [px]."""
+
+
+def measure_offsets(look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> Floats:
+    """(p, 2) how far both ends of each segment lie beside their lines [px].
+
+    Args:
+        camera_step: (7,) of :data:`~world_models.camera.CAMERA_UNKNOWNS`.
+        pieces_world: (p, 2, 3) where the line of each pair is [m].
+    """
+    ends = _project(look, pose, camera_step, pieces_world)
+    along = ends[:, 1] - ends[:, 0]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(np.einsum("pei,pi->pe", look.segments_px - ends[:, :1], across))
+
+
+def _project(look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> Floats:
+    camera, mount = move_camera(look.camera, look.mount, camera_step)
+    return np.asarray(camera.project((mount.camera_from_robot @ pose.lifted().inverse()).apply(pieces_world)))
+
+
+def match_again(
+    look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float
+) -> SeenPicture:
+    """The look with each of its segments paired with the line that it lies on, and with no other.
+
+    Args:
+        pieces_world: (m, 2, 3) where the visible piece of each expected line is [m].
+        within_px: both ends of a segment lie no further beside its line.
+    """
+    off, shared, lengths, _ = _lay_beside(look, pose, camera_step, pieces_world)
+    off = np.where(shared > 0.5 * lengths, off, np.inf)
+    nearest = np.argmin(off, axis=0)
+    kept = np.flatnonzero(off[nearest, np.arange(off.shape[1])] < within_px)
+    return replace(look, pairs=nearest[kept], segments_px=look.every_px[kept])
+
+
+def measure_support(
+    look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats, within_px: float
+) -> float:
+    """How many of the lines (m, 2, 3) segments lie on, each by the part of its length on which they do."""
+    off, shared, _, line_px = _lay_beside(look, pose, camera_step, pieces_world)
+    covered = np.sum(np.where(off < within_px, np.maximum(shared, 0.0), 0.0), axis=1)
+    return float(np.sum(np.minimum(1.0, covered / line_px)))
+
+
+def _lay_beside(
+    look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of m lines and s segments: how far a segment's further end lies beside the line, and what length they share
+    (m, s); the lengths along the line of the segments (m, s), and of the lines (m,) [px]."""
+    ends = _project(look, pose, camera_step, pieces_world)
+    along = ends[:, 1] - ends[:, 0]
+    line_px = np.linalg.norm(along, axis=1)
+    along = along / line_px[:, None]
+    to = look.every_px[None] - ends[:, None, :1]
+    off = np.abs(to[..., 1] * along[:, None, None, 0] - to[..., 0] * along[:, None, None, 1]).max(axis=2)
+    at = np.sort(np.einsum("msei,mi->mse", to, along), axis=2)
+    shared = np.minimum(at[..., 1], line_px[:, None]) - np.maximum(at[..., 0], 0.0)
+    return off, shared, at[..., 1] - at[..., 0], line_px
+
+
+def measure_slopes(look: SeenPicture, pose: Pose2, camera_step: Floats, pieces_world: Floats) -> tuple[Floats, Floats]:
+    """By how much the offsets change with pose and camera, (p, 2, 10), and with the place of each line, (p, 2, 3)."""
+    here = measure_offsets(look, pose, camera_step, pieces_world)
+    by_state, state = [], np.concatenate([pose.vector, camera_step])
+    for i, step in enumerate(STEPS):
+        moved = state + step * np.eye(len(STEPS))[i]
+        offsets = measure_offsets(look, Pose2(*moved[:3].tolist()), moved[3:], pieces_world)
+        by_state.append((offsets - here) / step)
+    by_place = [(measure_offsets(look, pose, camera_step, pieces_world + MOVE_M * np.eye(3)[i]) - here) / MOVE_M
+                for i in range(3)]
+    return np.stack(by_state, axis=-1), np.stack(by_place, axis=-1)

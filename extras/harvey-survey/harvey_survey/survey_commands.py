@@ -24,8 +24,7 @@ def _ledger_arguments(parser: ArgumentParser) -> None:
 
 
 def _run_ledger(args: Namespace) -> int:
-    from harvey_survey.ledger import read_ledger
-    from harvey_survey.ledger_output import format_ledger, ledger_json, write_plan
+    from harvey_survey.ledger import format_ledger, ledger_json, read_ledger, write_plan
     from logs.run_directory import open_run
 
     world = load_file(args.file, [])
@@ -38,15 +37,15 @@ def _run_ledger(args: Namespace) -> int:
         print(ledger_json(ledger), end="")
         return 0
     if args.json is not None:
-        write_text(args.json, "--json", ledger_json(ledger))
+        write_file(Path(args.json), "--json", ledger_json(ledger).encode())
     print(format_ledger(ledger), end="")
     return 0
 
 
-def write_text(out: str, option: str, text: str) -> None:
+def write_file(out: Path, option: str, data: bytes) -> None:
     """Write a file. Raises BadInput."""
     try:
-        Path(out).write_text(text, encoding="utf-8")
+        out.write_bytes(data)
     except OSError as error:
         raise BadInput(f"{option} {out}: expected a file to write to, got: {error.strerror}") from None
 
@@ -90,12 +89,8 @@ def _run_survey(args: Namespace) -> int:
         patch = patch.accepting(chosen, is_accepted=True, others=False)
     if args.undo is not None:
         patch = patch.accepting({"all": every, "none": []}.get(args.undo, args.undo), is_accepted=False)
-    data = write_world(path, patch)
-    try:
-        out.write_bytes(data)
-    except OSError as error:
-        raise BadInput(f"--out {out}: expected a file to write to, got: {error.strerror}") from None
-    write_text(str(target), "--patch", format_patch(patch))
+    write_file(out, "--out", write_world(path, patch))
+    write_file(target, "--patch", format_patch(patch).encode())
     for one in patch.proposals:
         print(tell_proposal(one))
     made = sum(one.is_accepted and not one.why_not for one in patch.proposals)
@@ -105,10 +100,9 @@ def _run_survey(args: Namespace) -> int:
 
 def _survey(args: Namespace, path: Path) -> Patch:
     """The patch by the runs; prints by what it was made."""
-    from harvey_survey.adjustment import adjust
+    from harvey_survey.adjustment import adjust, propose_changes
     from harvey_survey.patch_file import build_patch
     from harvey_survey.seen_pictures import read_looks
-    from harvey_survey.survey_changes import propose_changes
     from logs.run_directory import open_run
 
     world = load_file(str(path), [])

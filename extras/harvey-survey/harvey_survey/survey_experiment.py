@@ -6,22 +6,21 @@ The truth is the simulator's; the survey sees journals alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.generated.missions import write_inexact_mission
 from experiments.report import Report
 from experiments.trials import campaign_folder, judge_rare, judge_share, run_trials
 from harvey.simulation.simulated_run import build_head, run_mission
-from harvey_survey.adjustment import Adjustment, adjust
+from harvey_survey.adjustment import Adjustment, SurveyChange, adjust, propose_changes
 from harvey_survey.ledger import build_ledger
 from harvey_survey.patch_file import build_patch, write_world
 from harvey_survey.seen_pictures import read_looks
-from harvey_survey.survey_changes import SurveyChange, propose_changes
-from harvey_survey.wrong_buildings import write_missions
 from logs.run_directory import RunDirectory
 from sim.ground_truth.inexact import TrueInexact, displace
 from sim.scenario import parse_scenario
@@ -35,7 +34,7 @@ from world_models.units import INCH_M
 
 SIGMA_M, MISSING = 0.05, 0.15
 TRUTH = TrueInexact(sigma_m=SIGMA_M, missing=MISSING)
-BUILDINGS, MISSIONS, AFTER = 8, 6, 2
+BUILDINGS, MISSIONS, AFTER, ROOMS = 8, 6, 2, 4
 QUICK = 1, 3, 1
 """Buildings, missions by which each is surveyed, and missions in the surveyed model."""
 FIRST_SEED = 100
@@ -84,7 +83,9 @@ class SurveyedBuilding:
 def survey_building(case: BuildingCase) -> SurveyedBuilding:
     """Drive, survey, judge, and drive again."""
     folder = Path(case.folder) / f"floor-{case.seed}"
-    paths = write_missions(folder, case.seed, TRUTH, case.missions + case.after, SIGMA_M)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [write_inexact_mission(folder, case.seed, TRUTH, stated_m=SIGMA_M, rooms=ROOMS, draw=(17, n),
+                                   name=f"mission-{n}") for n in range(case.missions + case.after)]
     runs = []
     for number, path in enumerate(paths[: case.missions]):
         run = RunDirectory(folder / f"run-{number}")
@@ -105,7 +106,8 @@ def survey_building(case: BuildingCase) -> SurveyedBuilding:
     reached = sum(_drive_after(path, better, number) for number, path in enumerate(paths[case.missions :]))
     gone = {e.name for e in ledger.elements if e.name in truth.missing and e.pictures >= EXPECTED}
     return SurveyedBuilding(
-        case.seed, len(looks), truth.measure_all(model, often), truth.measure_all(surveyed, often),
+        case.seed, len(looks), [truth.measure(model, name) for name in often],
+        [truth.measure(surveyed, name) for name in often],
         truth.compare(found), len(gone), len(gone & {c.name for c in changes if c.is_gone}), len(changes),
         sum(truth.is_wrong(change, model, surveyed) for change in changes), reached, case.after)
 
@@ -139,14 +141,10 @@ class SurveyTruth:
         true = displace(specs[0], replace(TRUTH, seed=seed))
         return SurveyTruth(build_world(true.spec), frozenset(true.missing), model)
 
-    def measure_all(self, world: World, names: Sequence[str]) -> list[float]:
-        """How far landmarks of a model are from the truth [m]; walls along their normals."""
-        kinds = {mark.name: mark.kind for mark in self.model.landmarks}
-        return [self.measure(world, name, is_wall=kinds[name] == "wall") for name in names]
-
-    def measure(self, world: World, name: str, *, is_wall: bool) -> float:
+    def measure(self, world: World, name: str) -> float:
+        """How far a landmark of a model is from the truth [m]; a wall along its normal."""
         own, true = world.landmark(name).lines_world, self.world.landmark(name).lines_world
-        if not is_wall:
+        if self.model.landmark(name).kind != "wall":
             return float(np.linalg.norm((true - own).mean(axis=(0, 1))))
         flat = np.ptp(own.reshape(-1, 3)[:, :2], axis=0)
         across = int(np.argmin(flat))
@@ -181,16 +179,14 @@ class SurveyTruth:
         if change.kind == "wall":
             room, _, number = change.name.rpartition(WALL)
             i = int(number)
-            true, before, after = (world.outline(room)[i : i + 2].mean(axis=0)
-                                   for world in (self.world, model, surveyed))
-            along = model.outline(room)[(i + 1) % len(model.outline(room))] - model.outline(room)[i]
-            across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+            true, before, after = (world.outline(room)[i] for world in (self.world, model, surveyed))
+            along = np.roll(model.outline(room), -1, axis=0)[i] - before
+            across = np.array([-along[1], along[0]])
             return abs(float((after - true) @ across)) >= abs(float((before - true) @ across))
         if change.name in self.missing:
             return True
-        names = [mark.name for mark in model.landmarks]
-        name = next(name for name in names if name == change.name or name.endswith(f"/{change.name}"))
-        return self.measure(surveyed, name, is_wall=False) >= self.measure(model, name, is_wall=False)
+        names = (mark.name for mark in model.landmarks if f"/{mark.name}".endswith(f"/{change.name}"))
+        return self.measure(surveyed, name := next(names)) >= self.measure(model, name)
 
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
@@ -205,20 +201,14 @@ def run(quick: bool, seed: int, missions: int | None = None) -> Report:
 
 def report(ends: Sequence[SurveyedBuilding]) -> Report:
     """The table and the claims of some buildings."""
-
-    def join(part: Callable[[SurveyedBuilding], Sequence[float]]) -> list[float]:
-        return [value for end in ends for value in part(end)]
-
-    def total(part: Callable[[SurveyedBuilding], int]) -> int:
-        return sum(map(part, ends))
-
-    before, after, z = join(lambda e: e.before_m), join(lambda e: e.after_m), np.abs(join(lambda e: e.z))
-    gone, found, changes, wrong = (total(part) for part in (
-        lambda e: e.gone, lambda e: e.gone_found, lambda e: e.changes, lambda e: e.wrong))
-    held, reached, driven = int(np.count_nonzero(z <= WITHIN_95)), total(lambda e: e.reached), total(lambda e: e.driven)
+    before, after = [m for e in ends for m in e.before_m], [m for e in ends for m in e.after_m]
+    z = np.abs([z for e in ends for z in e.z])
+    gone, found, changes, wrong, reached, driven = np.sum(
+        [(e.gone, e.gone_found, e.changes, e.wrong, e.reached, e.driven) for e in ends], axis=0).tolist()
+    held = int(np.count_nonzero(z <= WITHIN_95))
     rows = [(f"floor {e.seed}", e.pictures, len(e.after_m), *_spread_cm(e.before_m), *_spread_cm(e.after_m),
-             _share(np.abs(e.z) <= WITHIN_95), f"{e.gone_found}/{e.gone}", f"{e.wrong}/{e.changes}",
-             f"{e.reached}/{e.driven}") for e in ends]
+             f"{np.mean(np.abs(e.z) <= WITHIN_95):.0%}" if e.z else "-", f"{e.gone_found}/{e.gone}",
+             f"{e.wrong}/{e.changes}", f"{e.reached}/{e.driven}") for e in ends]
     median_m, most_m = (float(np.percentile(after, part)) if after else 0.0 for part in (50, 95))
     return Report(
         "Surveys of buildings whose models are wrong by 5 cm a thing, 15 % gone",
@@ -247,8 +237,4 @@ def report(ends: Sequence[SurveyedBuilding]) -> Report:
 
 def _spread_cm(errors_m: Sequence[float]) -> tuple[float, float]:
     return (float(100.0 * np.median(errors_m)), float(100.0 * np.percentile(errors_m, 95))) if errors_m else (0.0, 0.0)
-
-
-def _share(held: NDArray[np.bool_]) -> str:
-    return f"{np.mean(held):.0%}" if len(held) else "-"
 

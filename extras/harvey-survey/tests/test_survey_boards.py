@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -13,19 +12,16 @@ from PIL import Image
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey_survey.board_pictures import Boards, calibrate_camera, find_boards, picture_files, save_board
-from harvey_survey.intrinsics import BoardView, Calibration, Pattern, calibrate, find_board
-from harvey_survey.mounting import estimate_mounting
-from harvey_survey.rendered_boards import board_picture, board_renderer, board_view
+from harvey_survey.board_pictures import Boards, calibrate_camera, find_boards, save_board
+from harvey_survey.calibrate_experiment import CAMERA, PATTERN, board_picture, board_renderer, board_view
+from harvey_survey.intrinsics import BoardView, Calibration, calibrate, estimate_mounting, find_board
 from knowledge_sources.methods.features import read_picture
 from sim.render.optics import Optics
 from sim.render.sensor import SensorParameters
-from world_models.camera import Camera, CameraDeviation, CameraMount
+from world_models.camera import CameraDeviation, CameraMount
 from world_models.files.toml.camera_file import load_camera
 from world_models.frames import Pose
 
-PATTERN = Pattern(7, 5, 0.025)
-CAMERA = Camera(402.0, 405.0, 250.3, 259.1, 512, 512, (-0.2, 0.05, 0.001, -0.0005))
 TRUE = np.array([402.0, 405.0, 250.3, 259.1, -0.2, 0.05, 0.001, -0.0005])
 VIEWS = 10
 
@@ -41,10 +37,6 @@ def seen(picture: bytes, name: str = "") -> BoardView:
     found = find_board(name, read_picture(picture).grey, PATTERN)
     assert isinstance(found, BoardView)
     return found
-
-
-def view_of(name: str, corners_px: Any) -> BoardView:
-    return BoardView(name, np.asarray(corners_px), np.arange(len(corners_px)))
 
 
 @pytest.fixture(scope="module")
@@ -96,24 +88,11 @@ def test_views_that_are_alike_count_once(pictures: list[bytes]) -> None:
 def test_a_camera_of_no_use_by_its_own_deviations_is_refused(views: list[BoardView]) -> None:
     rng = np.random.default_rng(1)
     lines = [CAMERA.project(np.add(PATTERN.points, [x, -0.08, 0.4])) for x in (-0.16, -0.12, -0.08, -0.04, 0.0)]
-    upright = [view_of(str(i), px + rng.normal(0.0, 0.05, px.shape)) for i, px in enumerate(lines)]
+    upright = [BoardView(str(i), px + rng.normal(0.0, 0.05, px.shape), np.arange(35)) for i, px in enumerate(lines)]
     told = r"focal length and principal point to 5\.1 px, got [fc][xy] \d+ \+- .*more sides"
     with pytest.raises(BadInput, match=told):
         calibrate_camera(Boards(tuple(upright), np.zeros((512, 512), np.uint8), (512, 512), ()), PATTERN, with_k3=False)
     assert np.all(calibrate(views[:5], PATTERN, (512, 512)).deviations[:4] < 3.0)
-
-
-def test_pictures_of_a_folder_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
-    for name in ("b10", "b2", "b1", "b100"):
-        (tmp_path / f"{name}.jpg").touch()
-    for given in (str(tmp_path), str(tmp_path / "b*.jpg")):
-        assert [path.stem for path in picture_files([given])] == ["b1", "b2", "b10", "b100"]
-
-
-def test_useless_pictures_say_why(pictures: list[bytes]) -> None:
-    assert find_board("", np.full((200, 200), 99, np.uint8), PATTERN) == "no board of 7 x 5 inner corners in it"
-    blurred = find_board("", cv2.GaussianBlur(read_picture(pictures[0]).grey, (0, 0), 6.0), PATTERN)
-    assert isinstance(blurred, str) and "board of 7 x 5 inner corners in it" in blurred
 
 
 @pytest.mark.parametrize("ending", ["png", "pdf"])
@@ -128,24 +107,19 @@ def test_the_board_is_printed_as_it_is_looked_for(tmp_path: Path, ending: str) -
         save_board(tmp_path / "board.xyz", PATTERN)
 
 
-def standing(height_m: float, tilt_rad: float, lowest_m: float, ahead_m: float) -> Pose:
-    """An upright board square before the robot: x to its right, y down."""
-    rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-    board = Pose(rotation, np.array([ahead_m, 4 * 0.025, lowest_m + 5 * 0.025]))
-    return CameraMount(height_m, 0.08, tilt_rad).camera_from_robot @ board
-
-
-def lying(height_m: float, tilt_rad: float, ahead_m: float) -> Pose:
-    """A board on the floor, square before the robot: x to its right, y towards it."""
-    rotation = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-    board = Pose(rotation, np.array([ahead_m + 5 * 0.025, 4 * 0.025, 0.0]))
+def placed(height_m: float, tilt_rad: float, upright: bool) -> Pose:
+    """A board half a metre before the robot, square to it: upright, its y down, or lying, its y towards it."""
+    turn = [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    lying = [[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
+    place = [0.5, 4 * 0.025, 0.06 + 5 * 0.025] if upright else [0.5 + 5 * 0.025, 4 * 0.025, 0.0]
+    board = Pose(np.array(turn if upright else lying), np.array(place))
     return CameraMount(height_m, 0.08, tilt_rad).camera_from_robot @ board
 
 
 @pytest.mark.parametrize("upright", [True, False])
 def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> None:
     tilt = math.radians(4.0 if upright else 28.0)
-    pose = standing(0.22, tilt, 0.06, 0.5) if upright else lying(0.3, tilt, 0.5)
+    pose = placed(0.22 if upright else 0.3, tilt, upright)
     rng = np.random.default_rng(4)
     picture = board_picture(board_renderer(PATTERN), Optics.of(CAMERA), pose, SensorParameters(), rng)
     found = estimate_mounting(calibration, seen(picture), PATTERN, standing_at_m=0.06 if upright else None)
@@ -156,7 +130,7 @@ def test_the_mounting_comes_back(calibration: Calibration, upright: bool) -> Non
 
 
 def test_a_board_nowhere_near_the_floor_is_refused(calibration: Calibration) -> None:
-    view = view_of("", CAMERA.project(standing(0.2, 0.0, 0.06, 0.5).apply(PATTERN.points)))
+    view = BoardView("", CAMERA.project(placed(0.2, 0.0, True).apply(PATTERN.points)), np.arange(35))
     with pytest.raises(ValueError, match="expected a board upright before the camera, got one that puts it -"):
         estimate_mounting(calibration, view, PATTERN, standing_at_m=-1.0)
 

@@ -12,12 +12,9 @@ import pytest
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey_survey.adjustment import adjust
-from harvey_survey.offsets import measure_offsets
-from harvey_survey.patch_file import build_patch, format_patch, read_patch, write_world
+from harvey_survey.adjustment import SurveyChange, adjust, find_gone, propose_changes, weigh_gone
+from harvey_survey.patch_file import apply_changes, build_patch, format_patch, read_patch, write_world
 from harvey_survey.seen_pictures import SeenPicture, read_looks
-from harvey_survey.survey_changes import SurveyChange, find_gone, propose_changes, weigh_gone
-from harvey_survey.text_edits import apply_changes
 from world_models.building.model_errors import find_line_errors
 from world_models.building.world import World
 from world_models.files.world_files import WORLDS, load_world
@@ -86,22 +83,13 @@ def test_right_model_stays(world: World, looks: tuple[SeenPicture, ...]) -> None
 
 
 def test_displacement_is_found_in_any_order(world: World, looks: tuple[SeenPicture, ...]) -> None:
-    """Segments are moved as if two things stood elsewhere by 8 cm; noise stays what it was."""
+    """The file has two things elsewhere by 8 cm; pictures and noise stay what they were."""
     wanted = {"allens-office/window-1 along": 0.08, "allens-office/white-board-1 along": -0.08}
     displaced = []
     for look in looks:
         errors = find_line_errors(world, look.marks, look.numbers.tolist(), 0.05).restate(1.0)
         offs = np.array([wanted.get(way, 0.0) for way in errors.displacement_modes])
-        there = errors.displace(look.pieces_world, offs)[look.pairs]
-        shift_px = measure_offsets(look, look.pose, np.zeros(7), there) - measure_offsets(
-            look, look.pose, np.zeros(7), look.pieces_world[look.pairs])
-        along = look.segments_px[:, 1] - look.segments_px[:, 0]
-        across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
-        signs = np.sign(measure_offsets(replace(look, segments_px=look.segments_px + across[:, None]), look.pose,
-                                        np.zeros(7), look.pieces_world[look.pairs])
-                        - measure_offsets(look, look.pose, np.zeros(7), look.pieces_world[look.pairs]))
-        there_px = look.segments_px - (signs * shift_px)[..., None] * across[:, None]
-        displaced.append(replace(look, segments_px=there_px, every_px=there_px))
+        displaced.append(replace(look, pieces_world=errors.displace(look.pieces_world, -offs)))
     found = adjust(world, displaced, 0.05)
     by_way = dict(zip(found.ways, found.offs_m.tolist(), strict=True))
     assert all(by_way[way] == pytest.approx(off, abs=0.025) for way, off in wanted.items())

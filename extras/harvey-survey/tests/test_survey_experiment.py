@@ -1,4 +1,4 @@
-"""The experiment of surveys: its missions do not depend on their number, and its truth is that of the simulator."""
+"""The experiment of surveys: its truth is that of the simulator."""
 
 from __future__ import annotations
 
@@ -8,35 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harvey_survey.survey_changes import SurveyChange
-from harvey_survey.survey_experiment import SIGMA_M, TRUTH, SurveyedBuilding, SurveyTruth, report
-from harvey_survey.wrong_buildings import write_missions
+from experiments.generated.missions import write_inexact_mission
+from harvey_survey.adjustment import SurveyChange
+from harvey_survey.survey_experiment import ROOMS, SIGMA_M, TRUTH, SurveyedBuilding, SurveyTruth, report
 from world_models.files.world_files import load_world
 
 SEED = 9001
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("wrong")
-    write_missions(folder, SEED, TRUTH, 2, SIGMA_M)
-    return folder
-
-
-def test_missions_are_the_same_whatever_their_count(folder: Path, tmp_path: Path) -> None:
-    one = write_missions(tmp_path, SEED, TRUTH, 1, SIGMA_M)
-    assert [path.name for path in one] == ["mission-0.toml"]
-    for name in ("mission-0.toml", f"floor-{SEED}.toml"):
-        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
-
-
-def test_truth_is_centimetres_from_the_model(folder: Path) -> None:
-    file = folder / f"floor-{SEED}.toml"
+def test_truth_is_centimetres_from_the_model(tmp_path: Path) -> None:
+    write_inexact_mission(tmp_path, SEED, TRUTH, stated_m=SIGMA_M, rooms=ROOMS)
+    file = tmp_path / f"floor-{SEED}.toml"
     model = load_world(file)
     truth = SurveyTruth.read(file, SEED, model)
     names = [mark.name for mark in model.landmarks if mark.kind != "wall" and mark.name not in truth.missing]
-    off_m = truth.measure_all(model, names)
-    assert 0.02 < np.median(off_m) < 0.12 and truth.measure_all(truth.world, names) == [0.0] * len(names)
+    off_m = [truth.measure(model, name) for name in names]
+    assert 0.02 < np.median(off_m) < 0.12 and all(truth.measure(truth.world, name) == 0.0 for name in names)
     name = names[0]
     there = np.mean(truth.world.landmark(name).lines_world - model.landmark(name).lines_world, axis=(0, 1))
     direction = there / np.linalg.norm(there)

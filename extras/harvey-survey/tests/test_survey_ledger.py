@@ -11,9 +11,7 @@ import pytest
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey_survey.ledger import Ledger, read_ledger
-from harvey_survey.ledger_output import is_sure
-from harvey_survey.seen_pictures import read_looks
+from harvey_survey.ledger import Ledger, is_sure, read_ledger
 from logs.run_directory import RunDirectory
 from world_models.files.world_files import WORLDS, load_world
 
@@ -51,17 +49,6 @@ def test_exact_model_is_not_off(ledger: Ledger) -> None:
     assert sum(e.counts.found for e in ledger.elements) > 0.8 * sum(e.counts.expected for e in ledger.elements)
     far = [offset for offset in ledger.offsets if is_sure(offset) and abs(offset.mean_m) > 0.01]
     assert ledger.offsets and far == []
-
-
-def test_pieces_are_of_lines_of_the_file(runs: list[RunDirectory]) -> None:
-    world = load_world(WORLD)
-    looks = read_looks(world, WORLD, runs)
-    assert looks and all(look.pairs.max() < len(look.marks) for look in looks)
-    for look in looks:
-        for mark, number, piece in zip(look.marks, look.numbers, look.pieces_world, strict=True):
-            low, high = sorted(mark.lines_world[number].tolist())
-            assert all(min(a, b) - 1e-2 <= p <= max(a, b) + 1e-2 for end in piece
-                       for a, b, p in zip(low, high, end, strict=True))
 
 
 def test_run_of_another_world_is_refused(runs: list[RunDirectory]) -> None:
