@@ -19,9 +19,10 @@ from knowledge_sources.settings import DEFAULT
 from things_in_hall import CARTON, HALL, Hall
 from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
 from world_models.building.model_errors import INEXACT_M, find_sigma_m, list_facing
-from world_models.entries import Difference, DoorPicture, DoorState, Evidence, Explanation, Obstacle, Rival, UserReport
+from world_models.entries import (
+    RISK, Difference, DoorPicture, DoorState, Evidence, Explanation, Obstacle, Rival, UserReport,
+)
 from world_models.entries.difference import DOORS, MODEL, SURE
-from world_models.entries.protection_level import RISK
 
 SOURCE = ModelReviser()
 DOOR, ROOMS = "archive-north-door", ("archive", HALL)
