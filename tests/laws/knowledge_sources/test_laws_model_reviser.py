@@ -20,7 +20,15 @@ from things_in_hall import CARTON, HALL, Hall
 from world_models.building.locale_frame import FRAME_OF, FrameChange, LocaleFrame
 from world_models.building.model_errors import INEXACT_M, find_sigma_m, list_facing
 from world_models.entries import (
-    RISK, Difference, DoorPicture, DoorState, Evidence, Explanation, Obstacle, Rival, UserReport,
+    RISK,
+    Difference,
+    DoorPicture,
+    DoorState,
+    Evidence,
+    Explanation,
+    Obstacle,
+    Rival,
+    UserReport,
 )
 from world_models.entries.difference import DOORS, MODEL, SURE
 
