@@ -113,7 +113,7 @@ class MissionResult:
         listed = record.get("happened")
         happened = None if listed is None else tuple(Happening(**one) for one in listed)
         return MissionResult(**{**record, "contacts": contacts, "turning_points": turning_points, "camera": camera,
-                                "happened": happened})
+                                "happened": happened, "refused": tuple(record.get("refused", ()))})
 
 
 def format_error(error_m: float) -> str:

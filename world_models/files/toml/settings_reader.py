@@ -98,7 +98,7 @@ MAX_NAMED = 12
 def suggest_keys(key: str, known: Iterable[str]) -> str:
     """What an error expects instead of an unknown key: the most similar keys, or all, or the first few."""
     names = list(known)
-    alike = difflib.get_close_matches(key, names, n=4, cutoff=0.6) or names[:MAX_NAMED]
+    alike = difflib.get_close_matches(key, names, n=4, cutoff=0.5) or names[:MAX_NAMED]
     more = f" ... ({len(names)} in all)" if len(names) > len(alike) == MAX_NAMED else ""
     return "one of " + ", ".join(alike) + more
 
