@@ -42,6 +42,7 @@ NOT_RUN = {
     r"harvey tell runs/": "a run that goes on; the tests of what is told start one",
     r"traced_paths": "the path tracer",
     r"harvey (explore|survey|world ledger) ": "minutes, or runs in a wrong building; the tests of harvey-survey do it",
+    r"harvey experiment (explore|people) ": "minutes; the tests of both packages drive missions of theirs",
     r"harvey serve runs/": "a run that another command is driving; the tests of harvey-serve drive one",
     r"--go-on": "a campaign that was cut off; the laws of campaigns cut many off",
 }
