@@ -154,8 +154,9 @@ class _Teller:
         others = [one for one in room.features if one.is_open and one is not door]
         if not others:
             return ["Leave the room."]
-        words = self._words(door.meanings, [one.meanings for one in others])
-        return [*(f"Leave the room by the {word} door." for word in words), "Leave the room."]
+        return [*(f"Leave the room by the {word} door." for word in self._words(door.own, [one.own for one in others])),
+                *(f"Leave the room by the door to the {word} hall."
+                  for word in self._words(door.meanings, [one.meanings for one in others])), "Leave the room."]
 
     def _tell_turn(self, state: State, leg: WayLeg, is_known: bool) -> Wordings:
         there = State(*leg.begin, leg.heading)
@@ -229,6 +230,8 @@ class _Teller:
         else:
             said = [f"It is the {ORDINALS[rank]} door{side}."] if rank < len(ORDINALS) else []
             said += [f"It is the last door{side}."] if own is row[-1] else []
+            said += [f"Walk past the {name}. It is the next door{side}."
+                     for name in self._marks_before(state, row, rank)]
         others = [sight.feature.meanings for sight in doors if sight.feature is not None and sight is not own]
         return said + [f"It is the {word} door{side}." for word in self._words(door.meanings, others)]
 
@@ -257,6 +260,11 @@ class _Teller:
 
     def _marks(self, state: State, length: float) -> list[str]:
         return [name for sight, name in self._things(state) if abs(sight.ahead_m - length) < HERE_M]
+
+    def _marks_before(self, state: State, row: Sequence[NamedSight], rank: int) -> list[str]:
+        """Things between a door and the one before it."""
+        low = row[rank - 1].ahead_m if rank else 0.3
+        return [name for sight, name in self._things(state) if low + 0.4 < sight.ahead_m < row[rank].ahead_m - 0.4]
 
 
 def _side_of_turn(before: float, after: float) -> str:
