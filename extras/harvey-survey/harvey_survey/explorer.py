@@ -2,7 +2,7 @@
 
 What it wants to know: the floor of a room that it has not seen, walls that it has not read, and what is behind a
 doorway (B. Yamauchi, A frontier-based approach for autonomous exploration, 1997). It moves only where it has seen
-floor; but round the start, nearer than its picture begins, whoever put it down there has looked.
+floor. Round the start, nearer than the lower edge of its picture, the floor is taken to be free.
 """
 
 from __future__ import annotations
