@@ -41,7 +41,7 @@ NOT_RUN = {
     r"harvey follow (BAG|ros2:|drive.mp4|pictures)": "a robot, or a recording; the tests of harvey-ros2 make some",
     r"harvey tell runs/": "a run that goes on; the tests of what is told start one",
     r"traced_paths": "the path tracer",
-    r"harvey (explore|survey|world ledger) ": "minutes, or runs in a wrong building; the tests of harvey-survey do it",
+    r"harvey explore |survey --(world|out)|runs/\*": "minutes, or runs in a wrong building; the tests of harvey-survey do it",
     r"harvey experiment (explore|people) ": "minutes; the tests of both packages drive missions of theirs",
     r"harvey serve runs/": "a run that another command is driving; the tests of harvey-serve drive one",
     r"--go-on": "a campaign that was cut off; the laws of campaigns cut many off",
@@ -54,8 +54,16 @@ FILES = {
     "unit.geojson": "world export research_center --to unit.geojson",
     "campus.geojson": "world export campus --to campus.geojson",
     "second-floor.toml": "world new second-floor --rooms office,kitchen,lab",
+    "floor.toml": "world new floor --rooms office,kitchen,lab",
 }
 """Files of the reader's, and what makes them here."""
+DAYS = ("monday", "tuesday", "wednesday")
+"""Runs in the floor of the reader's."""
+DAYS_MISSION = """world = "floor.toml"
+goal = "Go from the office to the lab"
+[start]
+heading_deg = 270.0
+"""
 MAY_FAIL = r"servo.plan=off|rough-day|light.lamps_off|experiment|harvey diff"
 """A mission may end otherwise than reached, a claim of an experiment fail, two runs differ."""
 
@@ -104,21 +112,24 @@ def run(command: str, here: Path) -> tuple[int, str]:
 
 def prepare(command: str, here: Path) -> None:
     """What the command names is there: runs, campaigns, files."""
-    for folder in re.findall(r"\bruns/[\w./-]+", command):
-        if "--out" in command or is_whole(here / folder):
+    for name, made_by in FILES.items():
+        if name in command and made_by not in command and not (here / name).exists():
+            make(made_by, here)
+    for folder in re.findall(r"(?<!--out )\bruns/[\w./-]+", command):
+        if is_whole(here / folder):
             continue
         name, _, seed = folder.removeprefix("runs/").rpartition("-")
         if folder == "runs/cluttered":
             make("run cluttered-hallway --out runs/cluttered", here)
         elif seed.isdigit():
             make(f"run {name} --seed {seed}", here)
+        elif seed in DAYS:
+            (here / "floor-mission.toml").write_text(DAYS_MISSION, encoding="utf-8")
+            make(f"run floor-mission.toml --seed {DAYS.index(seed)} --out {folder}", here)
         elif folder in ("runs/before", "runs/after"):
             make(f"run forty-foot-hallway {FEW_SEEDS} --out {folder}", here)
         else:
             make(f"run {folder.removeprefix('runs/')} {FEW_SEEDS}", here)
-    for name, made_by in FILES.items():
-        if name in command and made_by not in command and not (here / name).exists():
-            make(made_by, here)
 
 
 def is_whole(folder: Path) -> bool:
