@@ -4,16 +4,8 @@ In reading order:
 
 * :mod:`.buildings_commands`: ``harvey world import`` and ``harvey world export``.
 * :mod:`.importing`: the reader of a file's ending, and from its plan to a world file.
-* :mod:`.building_plan`: what a building file contains: spaces, openings, furnishings, and a report of what was used.
-* :mod:`.geojson`: GeoJSON read and written.
-* :mod:`.indoor_gml`: IndoorGML (OGC 14-005, and 2.0's core) read; :mod:`.indoor_gml_file` has its elements.
-* :mod:`.ifc`: IFC (ISO 16739) read, in a process of its own; :mod:`.ifc_file` has the opened file, :mod:`.ifc_elements`
-  what its elements are on the plan.
-* :mod:`.ros_map`: a ROS map read; :mod:`.ros_map_file` has its files, which are written too, :mod:`.ros_map_rooms` its
-  floor parted into rooms, at doorways and at wide openings (:mod:`.ros_map_openings`).
-* :mod:`.polygons`: outlines cleaned, kept apart by walls, and straightened at doors.
-* :mod:`.placement`: doors, wide openings and windows placed in walls, furniture and stairs fitted into rooms.
-* :mod:`.layout`: rooms with walls, openings and furniture in place.
+* :mod:`.formats`: the files of other programs. GeoJSON, IFC (in a process of its own), IndoorGML, ROS maps.
+* :mod:`.fitting`: from the plan that they say, spaces, openings and furnishings, to rooms with all in place.
 * :mod:`.world_text`: the world file.
 * :mod:`.exporters`: a world for other programs: ROS map, SVG, GeoJSON, glTF.
 
@@ -27,7 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from harvey_buildings.building_plan import BuildingError, ImportReport, NavigationGraph
+    from harvey_buildings.fitting.building_plan import BuildingError, ImportReport, NavigationGraph
     from harvey_buildings.importing import ImportedBuilding, Importer, import_building, read_plan
 
 __all__ = ["BuildingError", "ImportReport", "ImportedBuilding", "Importer", "NavigationGraph", "import_building",

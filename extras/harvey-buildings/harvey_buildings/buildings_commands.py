@@ -33,7 +33,7 @@ def _export_arguments(parser: ArgumentParser) -> None:
 
 def _import(file: str, out: str | None, wall_height_m: float | None) -> int:
     from harvey_buildings import import_building
-    from harvey_buildings.building_plan import NoWayError
+    from harvey_buildings.fitting.building_plan import NoWayError
 
     path = Path(file)
     target = Path(out or path.with_suffix(".toml").name)

@@ -13,7 +13,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from harvey_buildings.geojson import world_geojson
+from harvey_buildings.formats.geojson import world_geojson
 from world_models.building.geometry.scene import Floats
 from world_models.building.plan_view import find_storeys, plan_svg
 from world_models.building.world import World
@@ -91,7 +91,7 @@ def _inventory(world: World) -> str:
 def export_ros_map(world: World, out: Path, storey: int | None = None, resolution_m: float | None = None,
                    with_things: bool = True) -> str:
     """A storey as a ROS map: its .yaml, and its .pgm beside it."""
-    from harvey_buildings.ros_map_file import write_ros_map
+    from harvey_buildings.formats.ros_map_file import write_ros_map
 
     if out.suffix.lower() == ".pgm":
         raise ExportError(f"expected the name of the map's .yaml (its .pgm is written beside it), got {str(out)!r}")

@@ -7,9 +7,9 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from harvey_buildings.building_plan import BuildingError, BuildingPlan, ImportReport, NavigationGraph
-from harvey_buildings.layout import Layout, lay_out
-from harvey_buildings.ros_map_file import PICTURES, explain_bare_picture
+from harvey_buildings.fitting.building_plan import BuildingError, BuildingPlan, ImportReport, NavigationGraph
+from harvey_buildings.fitting.layout import Layout, lay_out
+from harvey_buildings.formats.ros_map_file import PICTURES, explain_bare_picture
 from harvey_buildings.world_text import world_text
 from world_models.building.checks import Watched, pass_on
 from world_models.plugins import list_plugins, load_plugins

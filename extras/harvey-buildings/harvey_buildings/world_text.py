@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from harvey_buildings.building_plan import Furnishing, Space, Storey, Window
-from harvey_buildings.layout import LINTEL_M, Layout
-from harvey_buildings.placement import PlacedOpening, PlacedWindow
-from harvey_buildings.polygons import Floats, find_center
+from harvey_buildings.fitting.building_plan import Furnishing, Space, Storey, Window
+from harvey_buildings.fitting.layout import LINTEL_M, Layout
+from harvey_buildings.fitting.placement import PlacedOpening, PlacedWindow
+from harvey_buildings.fitting.polygons import Floats, find_center
 
 HEAD = """\
 [finishes]   # none of these is in the building file

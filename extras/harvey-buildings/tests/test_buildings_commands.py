@@ -16,7 +16,7 @@ from world_models.building.plan_view import plan_svg
 from world_models.files.world_files import WORLDS, load_world
 
 MODULE = """
-from harvey_buildings.building_plan import BuildingPlan, Space, Storey
+from harvey_buildings.fitting.building_plan import BuildingPlan, Space, Storey
 import numpy as np
 
 SQUARE = np.array([[0.0, 0.0], [5.0, 0.0], [5.0, 4.0], [0.0, 4.0]])

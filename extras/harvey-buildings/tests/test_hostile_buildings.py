@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 from harvey.errors import MOST_LETTERS
 from harvey_buildings import import_building
-from harvey_buildings.building_plan import BuildingError
-from harvey_buildings.layout import MIN_OPENING_M
-from harvey_buildings.polygons import MOST_CROSSINGS, MOST_HOLES, extract_outline, repair
+from harvey_buildings.fitting.building_plan import BuildingError
+from harvey_buildings.fitting.layout import MIN_OPENING_M
+from harvey_buildings.fitting.polygons import MOST_CROSSINGS, MOST_HOLES, extract_outline, repair
 
 LIMIT_S = 60.0  # a file that would take for ever; a busy machine takes its time
 KEYS = "resolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"

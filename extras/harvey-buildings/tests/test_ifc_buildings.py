@@ -13,9 +13,9 @@ from ifc_house import House, box, flat
 
 from harvey.cli import main
 from harvey_buildings import BuildingError, import_building, read_plan
-from harvey_buildings.building_plan import Space
-from harvey_buildings.ifc_file import find_climbed_spaces
-from harvey_buildings.polygons import Floats, extract_outline, separate_outlines, straighten_wall
+from harvey_buildings.fitting.building_plan import Space
+from harvey_buildings.fitting.polygons import Floats, extract_outline, separate_outlines, straighten_wall
+from harvey_buildings.formats.ifc_file import find_climbed_spaces
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.toml.source import Source

@@ -16,7 +16,7 @@ from ifc_house import House, box
 from numpy.typing import NDArray
 
 from harvey_buildings import read_plan
-from harvey_buildings.building_plan import BuildingPlan
+from harvey_buildings.fitting.building_plan import BuildingPlan
 
 pytestmark = pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell")
 

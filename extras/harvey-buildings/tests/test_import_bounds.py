@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from ifc_house import House, box
 
 from harvey_buildings import BuildingError, read_plan
-from harvey_buildings.building_plan import BuildingPlan, Names, RoomLink, Space, Storey, slug
-from harvey_buildings.ifc_file import build_column, build_stairs, find_climbed_spaces
-from harvey_buildings.indoor_gml import _find_crossing, _Reader, read_indoor_gml
-from harvey_buildings.indoor_gml_file import find_origin, read_xml
-from harvey_buildings.layout import Layout, lay_out
+from harvey_buildings.fitting.building_plan import BuildingPlan, Names, RoomLink, Space, Storey, slug
+from harvey_buildings.fitting.layout import Layout, lay_out
+from harvey_buildings.formats.ifc_file import build_column, build_stairs, find_climbed_spaces
+from harvey_buildings.formats.indoor_gml import _find_crossing, _Reader, read_indoor_gml
+from harvey_buildings.formats.indoor_gml_file import find_origin, read_xml
 
 needs_ifc = pytest.mark.skipif(find_spec("ifcopenshell") is None, reason="needs ifcopenshell")
 NAMES = {"c": "http://www.opengis.net/indoorgml/1.0/core", "g": "http://www.opengis.net/gml/3.2",
@@ -163,7 +163,7 @@ def test_a_file_of_too_many_cells_or_none_is_refused(tmp_path: Path) -> None:
 def test_a_column_fills_its_hole_from_floor_to_ceiling(width: float, depth: float, turn: float, floor: float) -> None:
     import shapely
 
-    from harvey_buildings.placement import footprint
+    from harvey_buildings.fitting.placement import footprint
 
     hole = shapely.affinity.rotate(shapely.box(1.0, 1.0, 1.0 + width, 1.0 + depth), turn, use_radians=True)
     column = build_column("c", space("a", 0.0, 0.0, 9.0, 9.0, floor), hole)
@@ -283,7 +283,7 @@ def test_a_navigation_graph_has_lengths_in_metres_and_a_node_for_each_room(tmp_p
 
 @pytest.mark.parametrize(("x", "y"), [(3.0e5, -4.0e4), (-7.0e5, 12.0), (8.0, 6.0e6)])
 def test_the_origin_of_a_far_house_is_near_its_rooms_in_both_directions(x: float, y: float) -> None:
-    from harvey_buildings.ifc_file import ElementShape, find_plan_origin
+    from harvey_buildings.formats.ifc_file import ElementShape, find_plan_origin
 
     corners = np.array([[x + u, y + v, z] for u in (-2.0, 2.0) for v in (-1.0, 1.0) for z in (0.0, 2.5)])
     origin = find_plan_origin([ElementShape(corners, (), np.eye(4)[:3])])

@@ -13,10 +13,10 @@ from ifc_house import House, flat
 
 from harvey.cli import main
 from harvey_buildings import BuildingError
-from harvey_buildings.building_plan import BuildingPlan, Space, Storey, Window
-from harvey_buildings.ifc import read_ifc
-from harvey_buildings.layout import lay_out
-from harvey_buildings.ros_map import read_ros_map
+from harvey_buildings.fitting.building_plan import BuildingPlan, Space, Storey, Window
+from harvey_buildings.fitting.layout import lay_out
+from harvey_buildings.formats.ifc import read_ifc
+from harvey_buildings.formats.ros_map import read_ros_map
 from harvey_buildings.world_text import world_text
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source

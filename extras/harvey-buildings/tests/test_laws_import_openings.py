@@ -15,8 +15,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harvey_buildings.building_plan import Furnishing, Space, WallOpening, Window
-from harvey_buildings.placement import (
+from harvey_buildings.fitting.building_plan import Furnishing, Space, WallOpening, Window
+from harvey_buildings.fitting.placement import (
     PlacedOpening,
     build_bounding_boxes,
     doorway,

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harvey_buildings.polygons import (
+from harvey_buildings.fitting.polygons import (
     clean_outline,
     cut_holes_open,
     extract_outline,

@@ -17,10 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harvey_buildings.ros_map import Grid, find_wall_turn, gap_on_map, make_grid
-from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile
-from harvey_buildings.ros_map_openings import Gap, close_openings, line_cells
-from harvey_buildings.ros_map_rooms import clean_floor, close_gaps, part_rooms, rooms_beside
+from harvey_buildings.formats.ros_map import Grid, find_wall_turn, gap_on_map, make_grid
+from harvey_buildings.formats.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile
+from harvey_buildings.formats.ros_map_openings import Gap, close_openings, line_cells
+from harvey_buildings.formats.ros_map_rooms import clean_floor, close_gaps, part_rooms, rooms_beside
 
 Mask = NDArray[np.bool_]
 

@@ -17,8 +17,8 @@ from hypothesis.extra.numpy import arrays
 from harvey.cli import main
 from harvey_buildings import BuildingError, import_building, read_plan
 from harvey_buildings.experiments.scanned_map import ScanNoise, write_floor_map
-from harvey_buildings.ros_map import find_wall_turn, make_grid
-from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile, read_cells, read_map_yaml
+from harvey_buildings.formats.ros_map import find_wall_turn, make_grid
+from harvey_buildings.formats.ros_map_file import FREE, OCCUPIED, UNKNOWN, MapFile, read_cells, read_map_yaml
 from world_models.building.checks import check_world
 from world_models.building.world import World
 from world_models.files.toml.source import Source

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import shapely
 
-from harvey_buildings.ros_map import find_wall_turn, read_ros_map
-from harvey_buildings.ros_map_file import FREE, OCCUPIED, UNKNOWN
-from harvey_buildings.ros_map_rooms import clean_floor
+from harvey_buildings.formats.ros_map import find_wall_turn, read_ros_map
+from harvey_buildings.formats.ros_map_file import FREE, OCCUPIED, UNKNOWN
+from harvey_buildings.formats.ros_map_rooms import clean_floor
 
 ROOMS = {"left": (1.0, 1.0, 4.0, 5.0), "right": (4.2, 1.0, 9.0, 5.0), "above": (1.0, 5.2, 9.0, 8.0)}
 DOORS = ((4.0, 2.0, 4.2, 2.9), (2.0, 5.0, 3.0, 5.2), (6.5, 5.0, 7.3, 5.2))

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from harvey_buildings import import_building
 from harvey_buildings.exporters import ExportError, export_world
-from harvey_buildings.geojson import FRAME
-from harvey_buildings.ros_map_file import FREE, OCCUPIED, read_cells, read_map_yaml
+from harvey_buildings.formats.geojson import FRAME
+from harvey_buildings.formats.ros_map_file import FREE, OCCUPIED, read_cells, read_map_yaml
 from world_models.building.geometry.faces import area_vector
 from world_models.building.plan_view import find_storeys
 from world_models.building.world import World

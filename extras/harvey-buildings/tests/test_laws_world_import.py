@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.robustness.malformed_worlds import GML, IFC
 from harvey_buildings import BuildingError, import_building
-from harvey_buildings.ifc import ReadingProgress, await_answer
+from harvey_buildings.formats.ifc import ReadingProgress, await_answer
 from world_models.building.checks import check_world
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world

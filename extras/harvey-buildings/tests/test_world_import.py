@@ -10,10 +10,10 @@ import pytest
 
 from harvey.cli import main
 from harvey_buildings import BuildingError, ImportedBuilding, import_building
-from harvey_buildings.building_plan import Furnishing, Names, Space, WallOpening, slug
 from harvey_buildings.experiments.imported_building import draw_trips
-from harvey_buildings.placement import build_bounding_boxes, fit_into_room, place_door, place_wide_opening
-from harvey_buildings.polygons import (
+from harvey_buildings.fitting.building_plan import Furnishing, Names, Space, WallOpening, slug
+from harvey_buildings.fitting.placement import build_bounding_boxes, fit_into_room, place_door, place_wide_opening
+from harvey_buildings.fitting.polygons import (
     clean_outline,
     find_facing_stretches,
     separate_outlines,

@@ -1,4 +1,4 @@
-"""People: who walks in the simulated building."""
+"""People: who walks there in the simulator, how they are seen, and what the robot does for their sake."""
 
 from pathlib import Path
 

@@ -20,13 +20,13 @@ from experiments.report import Claim, Report
 from harvey.agent import build_agent
 from harvey.simulation.simulated_run import SimulatedRun, build_head
 from harvey.wiring import knowledge_sources
-from harvey_people.mover import Mover
-from harvey_people.passing import PassingWay
-from harvey_people.people_ahead import PeopleAhead, look_ahead
-from harvey_people.people_passer import PeoplePasser
-from harvey_people.people_waiter import PeopleWaiter
-from harvey_people.peopled import STEP_S, People, people_in
-from harvey_people.walking import CLOSE_M, NEAR_M
+from harvey_people.behaving.passing import PassingWay
+from harvey_people.behaving.people_ahead import PeopleAhead, look_ahead
+from harvey_people.behaving.people_passer import PeoplePasser
+from harvey_people.behaving.people_waiter import PeopleWaiter
+from harvey_people.seeing.mover import Mover
+from harvey_people.simulated.peopled import STEP_S, People, people_in
+from harvey_people.simulated.walking import CLOSE_M, NEAR_M
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from knowledge_sources.settings import Settings
 from logs.run_recorder import RunRecorder

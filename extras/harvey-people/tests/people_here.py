@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from harvey_people.figure import Figure
-from harvey_people.peopled import people_building
-from harvey_people.walking import Pedestrian
+from harvey_people.simulated.figure import Figure
+from harvey_people.simulated.peopled import people_building
+from harvey_people.simulated.walking import Pedestrian
 from sim.body.simulated_body import SimulatedBody
 from sim.body.simulated_building import SimulatedBuilding
 from sim.scenario import CameraSettings

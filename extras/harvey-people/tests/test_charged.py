@@ -9,8 +9,8 @@ from people_here import body_among, people_of, person
 
 from harvey.simulation.simulated_run import redraw, run_mission
 from harvey.wiring import KNOWLEDGE_SOURCES, foreign_sources
-from harvey_people.charged import CHARGED_S, OTHERS_S
-from harvey_people.walkers import WALKERS
+from harvey_people.simulated.charged import CHARGED_S, OTHERS_S
+from harvey_people.simulated.walkers import WALKERS
 from logs.explain.questions_in_words import answers
 from logs.run_directory import RunDirectory
 from logs.timeline import Timeline

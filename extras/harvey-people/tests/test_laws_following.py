@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harvey_people.following import GATE, MAX_UNSEEN_S, TURNS_M2_PER_S3, WALK_M_PER_S, follow, predict
-from harvey_people.meeting import THINKS_S, find_speed, measure_meeting, plan_straight
-from harvey_people.mover import Mover
-from harvey_people.passing import find_way, shift
-from harvey_people.sightings import SIDE_M, Sighting, is_seen_free, list_sightings
+from harvey_people.behaving.meeting import THINKS_S, find_speed, measure_meeting, plan_straight
+from harvey_people.behaving.passing import find_way, shift
+from harvey_people.seeing.following import GATE, MAX_UNSEEN_S, TURNS_M2_PER_S3, WALK_M_PER_S, follow, predict
+from harvey_people.seeing.mover import Mover
+from harvey_people.seeing.sightings import SIDE_M, Sighting, is_seen_free, list_sightings
 from world_models.actuator import ActuatorModel
 from world_models.entries import FreeFloor, Leg
 from world_models.frames import Pose2

@@ -12,10 +12,10 @@ import pytest
 from blackboard import Entry
 from generated_boards import Bench, effect_on, to_world
 from harvey.testing import HALL, check_source, plain_robot
-from harvey_people.mover import Mover
-from harvey_people.people_entries import PeopleHide
-from harvey_people.people_masker import PeopleMasker
-from harvey_people.silhouette import outline
+from harvey_people.behaving.people_entries import PeopleHide
+from harvey_people.seeing.mover import Mover
+from harvey_people.seeing.people_masker import PeopleMasker
+from harvey_people.seeing.silhouette import outline
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from world_models.entries import CameraPicture, Milestone, Segments
 from world_models.frames import Pose2

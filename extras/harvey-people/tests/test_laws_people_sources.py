@@ -11,12 +11,12 @@ import pytest
 from blackboard import Entry, Post, Revise
 from generated_boards import Bench, to_world
 from harvey.testing import HALL, check_source, plain_robot
-from harvey_people.mover import Mover
-from harvey_people.mover_explainer import MoverExplainer
-from harvey_people.mover_watcher import MoverWatcher
-from harvey_people.people_entries import PeoplePass, PeopleWait
-from harvey_people.people_passer import PeoplePasser
-from harvey_people.people_waiter import MAX_WAIT_S, PeopleWaiter
+from harvey_people.behaving.people_entries import PeoplePass, PeopleWait
+from harvey_people.behaving.people_passer import PeoplePasser
+from harvey_people.behaving.people_waiter import MAX_WAIT_S, PeopleWaiter
+from harvey_people.seeing.mover import Mover
+from harvey_people.seeing.mover_explainer import MoverExplainer
+from harvey_people.seeing.mover_watcher import MoverWatcher
 from world_models.entries import Evidence, FloorThing, FreeFloor, Impasse, MotorCommand, Obstacle, PictureRequest, Place
 from world_models.frames import Pose2
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from people_here import body_among, figure, people_of, person
 
-from harvey_people.figure import outline
-from harvey_people.walking import WIDTH_M
+from harvey_people.simulated.figure import outline
+from harvey_people.simulated.walking import WIDTH_M
 from sim.body.collision import Obstacles
 from world_models.frames import Pose2
 

@@ -9,7 +9,7 @@ import pytest
 
 import harvey_people
 from harvey_people import people_experiment
-from harvey_people.peopled import people_in
+from harvey_people.simulated.peopled import people_in
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, scenario_from_tables
 from sim.stage import build_stage
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from harvey_ros2.bag_reader import Bag
-from harvey_ros2.follow_command import build_robot, follow_bag
-from harvey_ros2.messages import message_types
-from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
-from harvey_ros2.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
-from harvey_ros2.run_messages import RunMessages, TimedMessage
+from harvey_ros2.emulated.robot_emulator import RobotEmulator, write_camera_info, write_mount, write_picture
+from harvey_ros2.following.follow_command import build_robot, follow_bag
+from harvey_ros2.following.onlooker import FirstGuess, Onlooker, build_onlooker_head
+from harvey_ros2.messages.messages import message_types
+from harvey_ros2.messages.run_messages import RunMessages, TimedMessage
+from harvey_ros2.recordings.bag_reader import Bag
 from sim.faults.fault import Fault
 from sim.scenario import load_scenario
 from sim.stage import build_stage

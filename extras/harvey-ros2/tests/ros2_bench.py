@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 from itertools import count
 from typing import Any
 
-from harvey_ros2.messages import message_types
-from harvey_ros2.middleware import Heard
-from harvey_ros2.robot_emulator import RobotEmulator
-from harvey_ros2.robot_file import DriveSettings, ScanMount
-from harvey_ros2.ros2_base import Ros2Base
+from harvey_ros2.emulated.robot_emulator import RobotEmulator
+from harvey_ros2.messages.messages import message_types
+from harvey_ros2.messages.middleware import Heard
+from harvey_ros2.robot.robot_file import DriveSettings, ScanMount
+from harvey_ros2.robot.ros2_base import Ros2Base
 from sim.emulators.emulator import IdealGround
 
 TICK_S = 0.01
@@ -27,7 +27,7 @@ def deliver(_time_s: float, _key: str, cdr: bytes) -> list[tuple[float, bytes, s
 
 @dataclass
 class Bench:
-    """The robot's end, and a :class:`harvey_ros2.node.RobotMessages` for the driver.
+    """The robot's end, and a :class:`harvey_ros2.robot.node.RobotMessages` for the driver.
 
     Attributes:
         said: every message to the robot: time and speeds, as the bench reads them.

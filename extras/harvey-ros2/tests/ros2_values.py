@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from harvey_ros2.messages import MessageTypes
+from harvey_ros2.messages.messages import MessageTypes
 
 USED = (
     "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped", "nav_msgs/msg/Odometry", "sensor_msgs/msg/Image",

@@ -21,10 +21,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from harvey.cli import main
 from harvey.errors import BadInput
-from harvey_ros2.bag_reader import Bag
-from harvey_ros2.messages import message_types, ros_one_store
-from harvey_ros2.onlooker import FirstGuess
-from harvey_ros2.picture_message import retrieve_picture
+from harvey_ros2.following.onlooker import FirstGuess
+from harvey_ros2.messages.messages import message_types, ros_one_store
+from harvey_ros2.recordings.bag_reader import Bag
+from harvey_ros2.robot.picture_message import retrieve_picture
 
 TYPES = message_types("jazzy")
 PICTURE, INFO = "/camera/image_raw/compressed", "/camera/camera_info"

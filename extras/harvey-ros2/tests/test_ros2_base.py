@@ -16,11 +16,7 @@ from ros2_bench import TICK_S, Bench, deliver
 from ros2_values import plain
 
 from harvey.hardware.drivers.base_driver import BaseFault
-from harvey_ros2.messages import message_types, stamp
-from harvey_ros2.middleware import Heard, Topic
-from harvey_ros2.node import RosNode
-from harvey_ros2.odometry import OdometryFault, OdometryReader
-from harvey_ros2.robot_emulator import (
+from harvey_ros2.emulated.robot_emulator import (
     CdrWriter,
     RobotEmulator,
     read_speeds,
@@ -28,8 +24,12 @@ from harvey_ros2.robot_emulator import (
     write_mount,
     write_picture,
 )
-from harvey_ros2.robot_file import RobotFile
-from harvey_ros2.ros2_base import SAY_S
+from harvey_ros2.messages.messages import message_types, stamp
+from harvey_ros2.messages.middleware import Heard, Topic
+from harvey_ros2.robot.node import RosNode
+from harvey_ros2.robot.odometry import OdometryFault, OdometryReader
+from harvey_ros2.robot.robot_file import RobotFile
+from harvey_ros2.robot.ros2_base import SAY_S
 from sim.emulators.emulator import IdealGround
 from world_models.camera import Camera, CameraMount
 from world_models.entries import MotorCommand
@@ -143,7 +143,7 @@ def test_pictures_age_from_when_somebody_looks_and_by_their_stamps_and_an_order_
 ) -> None:
     network, now_s = Silent(), [100.0]
     monkeypatch.setattr(RobotFile, "open", lambda _robot: network)
-    monkeypatch.setattr("harvey_ros2.node.time.monotonic", lambda: now_s[0])
+    monkeypatch.setattr("harvey_ros2.robot.node.time.monotonic", lambda: now_s[0])
     node = RosNode(RobotFile())
 
     def show(stamp_s: float) -> None:
@@ -400,8 +400,8 @@ def test_the_emulators_writer_aligns_as_cdr_does() -> None:
 
 def test_the_emulators_own_definitions_are_those_of_ros_2() -> None:
     pytest.importorskip("cyclonedds")
-    from harvey_ros2.dds_middleware import build_idl_class
-    from harvey_ros2.robot_on_dds import COMMANDS, TOPICS, build_types
+    from harvey_ros2.emulated.robot_on_dds import COMMANDS, TOPICS, build_types
+    from harvey_ros2.messages.dds_middleware import build_idl_class
 
     def describe(kind: Any) -> Any:
         kind.__idl__.populate()

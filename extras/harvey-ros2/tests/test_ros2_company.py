@@ -15,11 +15,11 @@ import pytest
 from ros2_robot import emulated
 
 from harvey.cli import main
-from harvey_ros2.messages import message_types
-from harvey_ros2.middleware import Delivery, Heard, Topic
-from harvey_ros2.ros2_company import describe_place
-from harvey_ros2.run_messages import topic_of
-from harvey_ros2.zenoh_middleware import ZenohMiddleware
+from harvey_ros2.company.ros2_company import describe_place
+from harvey_ros2.messages.messages import message_types
+from harvey_ros2.messages.middleware import Delivery, Heard, Topic
+from harvey_ros2.messages.run_messages import topic_of
+from harvey_ros2.messages.zenoh_middleware import ZenohMiddleware
 from world_models.commands import parse_destination
 from world_models.files.toml.source import WORLDS
 from world_models.files.world_files import load_world

@@ -16,12 +16,12 @@ import pytest
 from ros2_bag import START, Truth, check_poses, drive_bag
 
 from harvey.cli import main
-from harvey_ros2.bag_reader import Bag
-from harvey_ros2.film_reader import Film, is_film
-from harvey_ros2.follow_command import build_robot, follow_film
-from harvey_ros2.messages import message_types
-from harvey_ros2.onlooker import FirstGuess, Onlooker, build_onlooker_head
-from harvey_ros2.run_messages import RunMessages, TimedMessage
+from harvey_ros2.following.follow_command import build_robot, follow_film
+from harvey_ros2.following.onlooker import FirstGuess, Onlooker, build_onlooker_head
+from harvey_ros2.messages.messages import message_types
+from harvey_ros2.messages.run_messages import RunMessages, TimedMessage
+from harvey_ros2.recordings.bag_reader import Bag
+from harvey_ros2.recordings.film_reader import Film, is_film
 from knowledge_sources.senses.lens_monitor import LensMonitor
 from sim.faults.built_in_faults import Kidnap
 from world_models.files.toml.camera_file import camera_text

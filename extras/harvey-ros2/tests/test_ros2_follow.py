@@ -20,10 +20,10 @@ from ros2_bag import REACH, START, Truth, check_poses, drive_bag, follow
 from rosbags.rosbag2 import StoragePlugin
 
 from harvey.cli import main
-from harvey_ros2.bag_reader import BagItem, find_mount
-from harvey_ros2.follow_command import pair_with_odometry
-from harvey_ros2.onlooker import FirstGuess
-from harvey_ros2.run_messages import TimedMessage
+from harvey_ros2.following.follow_command import pair_with_odometry
+from harvey_ros2.following.onlooker import FirstGuess
+from harvey_ros2.messages.run_messages import TimedMessage
+from harvey_ros2.recordings.bag_reader import BagItem, find_mount
 from sim.faults.built_in_faults import Kidnap
 from world_models.camera import CameraMount
 from world_models.entries import CameraState

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from rosbags.highlevel import AnyReader
 
 from harvey.cli import main
-from harvey_ros2.messages import message_types, seconds
-from harvey_ros2.run_messages import quaternion
+from harvey_ros2.messages.messages import message_types, seconds
+from harvey_ros2.messages.run_messages import quaternion
 from logs.pictures import open_pictures
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead

@@ -11,8 +11,8 @@ from ros2_values import USED, plain, random_message
 
 from blackboard import Level
 from harvey.testing import house, plain_robot
-from harvey_ros2.messages import MessageError, MessageTypes, dds_name, message_types, seconds, stamp
-from harvey_ros2.run_messages import RunMessages
+from harvey_ros2.messages.messages import MessageError, MessageTypes, dds_name, message_types, seconds, stamp
+from harvey_ros2.messages.run_messages import RunMessages
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from world_models.entries import Certificate, Difference, Discrepancy, MilestoneVerdict, Rival
 from world_models.entries.discrepancy import DiscrepancyStatus
@@ -53,7 +53,7 @@ def test_names_and_times() -> None:
 def test_bytes_are_those_of_cyclonedds_for_random_values_both_ways(name: str) -> None:
     """Two programs that share no code: a class that cyclonedds codes by itself, and rosbags."""
     pytest.importorskip("cyclonedds")
-    from harvey_ros2.dds_middleware import build_idl_class
+    from harvey_ros2.messages.dds_middleware import build_idl_class
 
     theirs, rng = build_idl_class(TYPES, name), np.random.default_rng(1)
     values = VALUES if name != "visualization_msgs/msg/MarkerArray" else VALUES // 4  # its messages are long

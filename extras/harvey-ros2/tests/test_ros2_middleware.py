@@ -17,9 +17,9 @@ import pytest
 import zenoh
 from ros2_values import plain
 
-from harvey_ros2.messages import MessageTypes, message_types
-from harvey_ros2.middleware import LATCHED, SENSOR, Heard, Middleware, Topic, full_name
-from harvey_ros2.zenoh_middleware import ZenohMiddleware
+from harvey_ros2.messages.messages import MessageTypes, message_types
+from harvey_ros2.messages.middleware import LATCHED, SENSOR, Heard, Middleware, Topic, full_name
+from harvey_ros2.messages.zenoh_middleware import ZenohMiddleware
 
 TYPES = message_types("jazzy")
 ODOM = Topic("/robot/odom", "nav_msgs/msg/Odometry", SENSOR)
@@ -48,7 +48,7 @@ def middlewares(request: pytest.FixtureRequest) -> Iterator[Open]:
     opened: list[Middleware] = []
     if request.param == "dds":
         pytest.importorskip("cyclonedds")
-        from harvey_ros2.dds_middleware import DdsMiddleware
+        from harvey_ros2.messages.dds_middleware import DdsMiddleware
 
         yield lambda types, node: opened.append(DdsMiddleware(types, node, domain=77)) or opened[-1]  # type: ignore[func-returns-value]
     else:

@@ -19,8 +19,8 @@ from ros2_robot import GOAL_M, Emulated, emulated
 
 from harvey.cli import main
 from harvey.simulation.simulated_run import run_mission
-from harvey_ros2.robot_emulator import WATCHDOG_S
-from harvey_ros2.robot_file import DriveSettings, RobotFile, read_robot
+from harvey_ros2.emulated.robot_emulator import WATCHDOG_S
+from harvey_ros2.robot.robot_file import DriveSettings, RobotFile, read_robot
 from sim.scenario import SCENARIOS, load_scenario
 from sim.stage import build_stage
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ros2_bench import Bench
 
-from harvey_ros2.laser_scan import MOST_M, SECTORS, read_scan
-from harvey_ros2.messages import message_types
-from harvey_ros2.robot_file import SCAN, ScanMount
+from harvey_ros2.messages.messages import message_types
+from harvey_ros2.robot.laser_scan import MOST_M, SECTORS, read_scan
+from harvey_ros2.robot.robot_file import SCAN, ScanMount
 
 TYPES = message_types("jazzy")
 AHEAD = ScanMount()

@@ -1,0 +1,1 @@
+"""From what a building file says to rooms with walls, doors and furniture in place."""

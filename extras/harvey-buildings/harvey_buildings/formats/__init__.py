@@ -1,0 +1,1 @@
+"""The files of other programs: GeoJSON, IFC, IndoorGML, ROS maps."""

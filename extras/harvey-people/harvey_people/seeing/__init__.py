@@ -1,0 +1,1 @@
+"""Who walks there: seen in pictures and echoes, followed, and told from things."""

@@ -1,0 +1,1 @@
+"""A robot that is not there, as a network sees it."""

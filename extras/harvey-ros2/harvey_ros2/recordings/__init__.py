@@ -1,0 +1,1 @@
+"""What somebody else recorded: bags, films, folders of pictures with odometry."""
