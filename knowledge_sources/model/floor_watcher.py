@@ -55,7 +55,8 @@ class FloorWatcher(RobotKnowledgeSource):
         frame, belief = PICTURE.of(view), HELD.of(view)
         if belief.value.sigma_m > MAX_FLOOR_SIGMA_M or belief.value.sigma_rad > MAX_FLOOR_SIGMA_RAD:
             return None
-        if _is_seen(view, frame) or (rolling_course(view) is not None and _is_near_last(view, belief)):
+        is_seen = any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
+        if is_seen or (rolling_course(view) is not None and _is_near_last(view, belief)):
             return None
         return frame
 
@@ -99,11 +100,6 @@ def _is_near_last(view: View, belief: Belief) -> bool:
         return False
     eye = belief.pose @ Pose2(belief.robot.mount.forward_m, 0.0, 0.0)
     return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < FLOOR_STEP_M
-
-
-def _is_seen(view: View, frame: Entry[CameraPicture]) -> bool:
-    """Whether the floor was looked at in a picture already."""
-    return any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
 
 
 def _is_like(kept: FloorView, pose: Pose2) -> bool:

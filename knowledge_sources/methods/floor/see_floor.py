@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import cv2
@@ -130,13 +131,13 @@ def see_free_floor(
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
     unlike, tells, light = find_unlike(picture[grid.top:], model, last_light)
     unlike &= s.use_appearance
-    compare = _Comparison(robot, grid, model, unlike, picture, floor_m)
     alike = [seen for seen in earlier if abs(wrap_angle(seen.since.moved.heading_rad)) <= MAX_TURNED_RAD]
-    relief = compare(alike[0]) if s.use_parallax and alike else None
+    compare = cache(lambda k: _compare(alike[k], robot, grid, model, unlike, picture, floor_m))
+    relief = compare(0) if s.use_parallax and alike else None
     tested = tells
     if relief is not None and model.is_unknown.any():  # the motion alone tells what stands there
         by_motion = model.is_unknown | ~model.is_plain
-        elsewhere = [seen for seen in alike if seen.pose.distance_to(alike[0].pose) >= FLOOR_VIEW_DISTANCE_M]
+        elsewhere = [k for k, seen in enumerate(alike) if seen.pose.distance_to(alike[0].pose) >= FLOOR_VIEW_DISTANCE_M]
         again = compare(elsewhere[0]) if elsewhere and (by_motion & (relief.kinds == STANDING)).any() else None
         confirmed = model.is_unknown & relief.tells_of(np.full(grid.shape, _find_confirmed_part(grid)))
         sure = relief.agreeing(again, by_motion)
@@ -147,7 +148,7 @@ def see_free_floor(
     regions = find_regions(unlike, tested, grid, relief)
     reliefs = [] if relief is None else [relief]
     if reliefs and len(alike) > 1 and any(not (region.mask & unlike).any() for region in regions):
-        again = compare(alike[1])  # what looks like the floor is compared with one more picture
+        again = compare(1)  # what looks like the floor is compared with one more picture
         reliefs += [] if again is None else [again]
     built = [(region, _build_thing(region, grid, robot, pose, covariance, reliefs, unlike, s)) for region in regions]
     things = [(region, thing) for region, thing in built if thing is not None]
@@ -174,31 +175,20 @@ def _keep_off(doubtful_m: Floats, robot: RobotModel) -> Floats:
     return np.asarray(free_m)
 
 
-class _Comparison:
-    """Compares a picture with earlier ones."""
-
-    def __init__(self, robot: RobotModel, grid: FloorGrid, model: ModelFloor, unlike: NDArray[np.bool_],
-                 picture: NDArray[np.uint8], floor_m: float) -> None:
-        self._robot, self._grid, self._model, self._picture, self._floor_m = robot, grid, model, picture, floor_m
-        self._is_floor, self._found = model.is_plain & ~unlike, dict[int, Relief | None]()
-
-    def __call__(self, then: Seen) -> Relief | None:
-        """The relief by an earlier picture; compared once with each."""
-        if id(then) not in self._found:
-            self._found[id(then)] = self._compare(then)
-        return self._found[id(then)]
-
-    def _compare(self, then: Seen) -> Relief | None:
-        robot, grid, model, since = self._robot, self._grid, self._model, then.since
-        before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
-        now, earlier = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (self._picture, before))
-        both = TwoPictures(grid, now, earlier, since.moved, robot.camera, robot.mount)
-        modelled = None
-        if model.is_unknown.any():
-            old = predict_model_floor(robot, then.pose, grid, self._floor_m, MAX_ROLLED_OVER_M, MODEL_MARGIN_PX)
-            modelled = Modelled(model.ranges_m, model.standing_m, old.standing_m)
-        relief = find_relief(both, self._is_floor, since.sigma_m, since.sigma_rad, modelled)
-        return relief if relief is None or modelled is not None else relief.beside(~model.is_plain)
+def _compare(
+    then: Seen, robot: RobotModel, grid: FloorGrid, model: ModelFloor, unlike: NDArray[np.bool_],
+    picture: NDArray[np.uint8], floor_m: float,
+) -> Relief | None:
+    """The relief of a picture by an earlier one."""
+    before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
+    now, earlier = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (picture, before))
+    both = TwoPictures(grid, now, earlier, then.since.moved, robot.camera, robot.mount)
+    modelled = None
+    if model.is_unknown.any():
+        old = predict_model_floor(robot, then.pose, grid, floor_m, MAX_ROLLED_OVER_M, MODEL_MARGIN_PX)
+        modelled = Modelled(model.ranges_m, model.standing_m, old.standing_m)
+    relief = find_relief(both, model.is_plain & ~unlike, then.since.sigma_m, then.since.sigma_rad, modelled)
+    return relief if relief is None or modelled is not None else relief.beside(~model.is_plain)
 
 
 def find_unlike(

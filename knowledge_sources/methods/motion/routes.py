@@ -175,15 +175,11 @@ def find_bends(free: shapely.Geometry) -> Floats:
     found = [np.zeros((0, 2))]
     for part in shapely.get_parts(free):
         if not part.is_empty:
-            rings = orient(part)
-            found += [_find_reflex(np.asarray(ring.coords)[:-1, :2]) for ring in (rings.exterior, *rings.interiors)]
+            rings = orient(part)  # their inside is on their left
+            for ring in (np.asarray(line.coords)[:-1, :2] for line in (rings.exterior, *rings.interiors)):
+                before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+                found.append(ring[before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0])
     return _drop_duplicates(np.concatenate(found))
-
-
-def _find_reflex(ring: Floats) -> Floats:
-    """The corners (n, 2) of a ring at which it turns right; its interior is on its left."""
-    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    return np.asarray(ring[before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0])
 
 
 def _drop_duplicates(points: Floats) -> Floats:

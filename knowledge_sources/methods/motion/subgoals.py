@@ -339,12 +339,11 @@ class SubgoalPlanner:
 
     def _list_free_spaces(self, locale: str) -> Iterator[Geometry]:
         """Where the robot's centre may be, with ever smaller margins."""
-        margins_m = CLEARANCES_M
         if locale in self._cluttered:
             yield self._find_wide_space(locale)
-        for margin_m in margins_m:
+        for margin_m in CLEARANCES_M:
             yield self._free_space(locale, margin_m)
-        yield self._free_space(locale, margins_m[-1], is_round=True)
+        yield self._free_space(locale, CLEARANCES_M[-1], is_round=True)
 
     def _find_wide_space(self, locale: str) -> Geometry:
         """Where the robot's centre may be with more room to what the model lacks: its top may be wider than its feet.

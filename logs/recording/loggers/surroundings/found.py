@@ -1,4 +1,4 @@
-"""What the robot has found round it: contacts and echoes, the map of the floor, things in the way, doors open or shut."""
+"""What the robot has found: contacts and echoes, the map of the floor, things in the way, doors open or shut."""
 
 from __future__ import annotations
 
