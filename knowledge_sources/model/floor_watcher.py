@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from itertools import islice
 
-from blackboard import Change, Effect, Entry, Level, Post, Posted, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Posted, Revised, View, Watch
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, Seen, see_free_floor
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import (
@@ -20,7 +20,7 @@ from knowledge_sources.reads import (
     rolling_course,
 )
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.entries import LAST_VIEWS, CameraPicture, FloorAppearance, FloorView, FreeFloor, Hypothesis
+from world_models.entries import LAST_VIEWS, CameraPicture, FloorView, FreeFloor, Hypothesis
 from world_models.frames import Pose2, wrap_angle
 
 FLOOR_STEP_M = 0.04  # on the move the floor is looked at again after so much of the way
@@ -37,10 +37,9 @@ class FloorWatcher(RobotKnowledgeSource):
     """Looks at the floor in each picture, once the belief was corrected by it.
 
     It says how far the floor is free in each direction, and what ends it: something of the model, or a thing that the
-    model lacks. What the floor of a locale looks like it learns from where the robot has just driven. Some pictures are
-    kept to compare later ones with: what stands up from the floor moves differently than the floor. While the robot's
-    place is in doubt, or not known well, it does not look: it could not tell a wall from a thing. In the dark it sees
-    none of the floor, and no thing.
+    model lacks. Some pictures are kept to compare later ones with: what stands up from the floor moves differently than
+    the floor. While the robot's place is in doubt, or not known well, it does not look: it could not tell a wall from a
+    thing. In the dark it sees none of the floor, and no thing.
     """
 
     level, priority = Level.ACTION, Priority.SEE
@@ -49,14 +48,15 @@ class FloorWatcher(RobotKnowledgeSource):
         Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in CORRECTED_BY),
     )
     needs = (GOING_ON, PICTURE, HELD, UP_TO_DATE, SURE)
-    writes = (FreeFloor, FloorAppearance, FloorView)
+    writes = (FreeFloor, FloorView)
 
     def bind(self, view: View, trigger: Change) -> Entry[CameraPicture] | None:
         """A picture in which the floor was not looked at yet, where the belief is sharp enough to tell by it."""
         frame, belief = PICTURE.of(view), HELD.of(view)
         if belief.value.sigma_m > MAX_FLOOR_SIGMA_M or belief.value.sigma_rad > MAX_FLOOR_SIGMA_RAD:
             return None
-        if _is_seen(view, frame) or (rolling_course(view) is not None and _is_near_last(view, belief)):
+        is_seen = any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
+        if is_seen or (rolling_course(view) is not None and _is_near_last(view, belief)):
             return None
         return frame
 
@@ -64,7 +64,6 @@ class FloorWatcher(RobotKnowledgeSource):
         frame, held = case, HELD.of(view)
         belief, locale, robot, pose = held.entry, held.locale, held.seeing, held.pose
         floor_m = robot.world.floor_m(locale)
-        known = {entry.value.locale: entry for entry in view.all(FloorAppearance)}
         kept = [entry for entry in islice(view.newest_first(FloorView), LAST_VIEWS)
                 if entry.value.belief == belief.id and entry.value.floor_m == floor_m]
         apart_m = FLOOR_VIEW_DISTANCE_M
@@ -72,18 +71,13 @@ class FloorWatcher(RobotKnowledgeSource):
         motions = [find_motion_between(view, entry.value, held) for entry in earlier]
         wheels = {entry.id: entry for _, reports in motions for entry in reports}
         lit = _find_lit(view, frame.value.sim_time_s)
-        seen, learnt = see_free_floor(
+        seen = see_free_floor(
             robot, locale, pose, held.covariance, frame.value.jpeg,
             [Seen(view[then.frame].value.jpeg, Pose2(then.x_m, then.y_m, then.heading_rad), motion)
              for then, (motion, _) in zip((entry.value for entry in earlier), motions, strict=True)],
-            {name: entry.value for name, entry in known.items()}, frame.value.sim_time_s, self._settings,
-            None if lit is None else lit.value.light)
-        reasons = (*kept, *wheels.values(), *(known[name] for name in (locale,) if name in known),
-                   *(() if lit is None else (lit,)))
+            frame.value.sim_time_s, self._settings, None if lit is None else lit.value.light)
+        reasons = (*kept, *wheels.values(), *(() if lit is None else (lit,)))
         yield Post(seen, (frame, belief, *reasons))
-        for appearance in learnt:
-            old, because = known.get(appearance.locale), (frame, belief, *kept)
-            yield Post(appearance, because) if old is None else Revise(old, appearance, (*because, old))
         if seen.bearings_rad and (not kept or not _is_like(kept[0].value, pose)):
             yield Post(FloorView(frame.id, belief.id, pose.x_m, pose.y_m, pose.heading_rad, floor_m,
                                  frame.value.sim_time_s, belief.value.sigma_m, belief.value.sigma_rad,
@@ -106,11 +100,6 @@ def _is_near_last(view: View, belief: Belief) -> bool:
         return False
     eye = belief.pose @ Pose2(belief.robot.mount.forward_m, 0.0, 0.0)
     return math.hypot(last.value.x_m - eye.x_m, last.value.y_m - eye.y_m) < FLOOR_STEP_M
-
-
-def _is_seen(view: View, frame: Entry[CameraPicture]) -> bool:
-    """Whether the floor was looked at in a picture already."""
-    return any(frame.ref in seen.because for seen in view.newest_first(FreeFloor))
 
 
 def _is_like(kept: FloorView, pose: Pose2) -> bool:

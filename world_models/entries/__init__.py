@@ -19,7 +19,7 @@ from world_models.entries.difference import Difference, Evidence, Explanation, M
 from world_models.entries.discrepancy import Discrepancy, LADDER, OPEN, correct, last_escalated, open_or_measure
 from world_models.entries.door_state import DoorCondition, DoorPicture, DoorState
 from world_models.entries.floor import (
-    FloorAppearance, FloorEnd, FloorThing, FloorView, FreeFloor, LAST_VIEWS, Light, Point,
+    FloorEnd, FloorThing, FloorView, FreeFloor, LAST_VIEWS, Light, Point,
 )
 from world_models.entries.location import (
     ALERT_LIMIT_M, Hypothesis, LocalePoses, Place, PlaceOdds, PlaceSearch, Protection, RISK, SHARED_SIGMA_M, Travel,
@@ -40,7 +40,7 @@ __all__ = [
     "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "DOOR_STATES", "GO_ON", "LADDER", "LAST_REPORTS", "LAST_VIEWS", "MISLEADING",
     "OPEN", "RISK", "SENSES", "SHARED_SIGMA_M", "STOP_KEY", "Alias", "AliasOdds", "Anchor", "BodyFault", "CameraLesson",
     "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners", "Course", "Difference",
-    "Discrepancy", "DoorCondition", "DoorPicture", "DoorState", "Drift", "Evidence", "Explanation", "FloorAppearance",
+    "Discrepancy", "DoorCondition", "DoorPicture", "DoorState", "Drift", "Evidence", "Explanation",
     "FloorEnd", "FloorThing", "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis", "Impasse", "Leg",
     "Light", "LineMatch", "LocalePoses", "Milestone", "MilestoneVerdict", "MotionReport", "MotorCommand", "Obstacle",
     "ObstacleStatus", "Obstruction", "Odometry", "Outcome", "Panorama", "PictureRequest", "Place", "PlaceOdds",

@@ -96,32 +96,6 @@ class FreeFloor:
         return f"the floor of {self.locale} is {free}, by the {self.sense}{named}; at {self.seen_s:.1f} s"
 
 
-Colour = tuple[float, float, float]
-
-
-@inference(keep=8)
-@dataclass(frozen=True, slots=True)
-class FloorAppearance:
-    """What the floor of a locale looks like, as far as it has been learnt from where the robot has just driven.
-
-    Attributes:
-        locale: whose floor.
-        mean: of its colour (red, green, blue) in pictures, 0..255.
-        covariance: (3, 3) of the logarithm of its brightness, and of red and blue as parts of it.
-        samples: how many pixels it was learnt from, as far as they count; 0: it is what the model says.
-    """
-
-    locale: str
-    mean: Colour
-    covariance: tuple[Colour, Colour, Colour]
-    samples: float
-
-    def sentence(self) -> str:
-        red, green, blue = self.mean
-        learnt = f"learnt from {self.samples:.0f} pixels" if self.samples else "as the model has it"
-        return f"the floor of {self.locale} looks ({red:.0f}, {green:.0f}, {blue:.0f}) of 255, {learnt}"
-
-
 def picture_of(view: FloorView) -> Iterable[str]:
     return (view.frame,)
 

@@ -45,7 +45,7 @@ def views(gloss: float, thing: bool) -> tuple[NDArray[np.float32], NDArray[np.fl
     assert grid is not None
     all_floor, nowhere = np.ones(grid.shape, bool), np.full(grid.shape, np.inf, np.float32)
     model = ModelFloor(np.zeros(grid.shape, np.int64), np.array([(0.4, 0.39, 0.37)]), all_floor, nowhere, nowhere)
-    unlike, _, _ = find_unlike(pictures[0][grid.top :], model, None)
+    unlike, _, _ = find_unlike(pictures[0][grid.top :], model)
     grey = [picture.astype(np.float32) @ GREY for picture in pictures]
     return grey[0], grey[1], unlike, before.inverse() @ now
 

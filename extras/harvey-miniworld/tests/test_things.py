@@ -36,7 +36,7 @@ def test_a_thing_on_a_textured_floor_is_seen_where_it_stands_and_no_thing_withou
     drawn.close()
     earlier = [Seen(jpeg, pose, MotionBetween(pose.inverse() @ poses[2], 0.005, 0.003))
                for pose, jpeg in zip(poses[1::-1], jpegs[1::-1], strict=True)]
-    seen = see_free_floor(robot, "corridor", poses[2], 1e-5 * np.eye(3), jpegs[2], earlier, {}, 1.0)[0]
+    seen = see_free_floor(robot, "corridor", poses[2], 1e-5 * np.eye(3), jpegs[2], earlier, 1.0)
     found = [shapely.Polygon(thing.footprint) for thing in seen.things if is_telling(thing)]
     assert bool(found) == bool(added)
     assert all(shape.distance(added[0].shape) < 0.3 for shape in found)

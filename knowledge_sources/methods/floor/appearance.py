@@ -1,4 +1,4 @@
-"""What the floor looks like: brightness and colour with covariance, from the model, from pictures, from where it drove.
+"""What the floor looks like: brightness and colour with covariance, from the model and from pictures.
 
 Light is not modelled: only the hue of the model's colour is relied on, and each picture tells how bright the floor is.
 """
@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats
-from world_models.entries import FloorAppearance
 
-MIN_FLOOR_PIXELS = 150  # with fewer pixels of a floor in sight, its looks are not learnt from a picture
+MIN_FLOOR_PIXELS = 150  # with fewer pixels of a floor in sight, its looks are not known from a picture
 MAX_CHROMA_ERROR = 0.035
 """Largest difference from the model's colour, in its parts of red and blue, of what may be floor."""
 MIN_CHROMA_SIGMA = 0.005  # floor of the standard deviation of the floor's colour
@@ -24,7 +23,6 @@ MAX_SHADE_STEP = 2.5
 """From floor in light to floor in shade, neighbouring pixels differ by at most so many standard deviations of the
 floor's looks."""
 MAX_SHADE_CHROMA = 0.06  # largest difference of the parts of red and blue between floor in light and in shade
-MAX_SAMPLES = 2000.0  # past pixels of a floor weigh at most as much as this many
 
 DARK = 6.0
 """Added to the sum of the three channels [0..765]: in the dark, noise is no colour."""
@@ -41,12 +39,12 @@ def compute_appearance(colours: Floats | NDArray[np.float32]) -> Floats:
 
 
 def default_covariance() -> Floats:
-    """(3, 3) of looks, where none is learnt: the least that is ever taken."""
+    """(3, 3) of looks, where none is fitted: the least that is ever taken."""
     return np.diag([MIN_BRIGHTNESS_SIGMA**2, MIN_CHROMA_SIGMA**2, MIN_CHROMA_SIGMA**2])
 
 
 def fit_appearance(
-    appearance: Floats, expected: Floats, is_learnt: bool, max_chroma_error: float | None = None
+    appearance: Floats, expected: Floats, is_lit: bool, max_chroma_error: float = MAX_CHROMA_ERROR
 ) -> tuple[Floats, Floats] | None:
     """Mean (3,) and covariance (3, 3) of the looks (n, 3) of a floor in one picture; None where it is not to be seen.
 
@@ -54,16 +52,16 @@ def fit_appearance(
     do not count.
 
     Args:
-        expected: (3,) looks by the model, or as learnt.
-        is_learnt: whether the brightness of ``expected`` tells anything.
-        max_chroma_error: in place of that of the settings.
+        expected: (3,) looks by the model, in the light of the last picture if that is known.
+        is_lit: whether the brightness of ``expected`` tells anything.
+        max_chroma_error: least difference in hue from ``expected`` of what is no floor.
     """
-    limit = MAX_CHROMA_ERROR if max_chroma_error is None else max_chroma_error
-    near = np.ascontiguousarray(appearance.compress(_has_hue(appearance, expected, limit), axis=0).T)  # (3, n), faster
+    alike = _has_hue(appearance, expected, max_chroma_error)
+    near = np.ascontiguousarray(appearance.compress(alike, axis=0).T)  # (3, n), faster
     if near.shape[1] < MIN_FLOOR_PIXELS:
         return None
     least = default_covariance()
-    mean, covariance = _find_mode(near.T, expected if is_learnt else None, least), 4.0 * least
+    mean, covariance = _find_mode(near.T, expected if is_lit else None, least), 4.0 * least
     for _ in range(ROUNDS):
         kept = near.compress(measure_unlike(near.T, mean, covariance) <= TRIM, axis=1)
         if kept.shape[1] < MIN_FLOOR_PIXELS:
@@ -109,32 +107,6 @@ def find_floor_in_shade(
     return np.asarray(reached[parts])
 
 
-def learn_appearance(
-    known: FloorAppearance | None, locale: str, colours: Floats
-) -> FloorAppearance | None:
-    """What a floor looks like after some of it (n, 3; 0..255) was driven over: the mean over what was learnt before.
-
-    None where there are too few pixels to add.
-    """
-    if len(colours) < MIN_FLOOR_PIXELS:
-        return known
-    appearance = compute_appearance(colours)
-    mean = np.median(colours, axis=0)
-    least = default_covariance()
-    spread = np.percentile(np.abs(appearance - np.median(appearance, axis=0)), 68.0, axis=0)
-    covariance = np.maximum(np.diag(spread**2), least)
-    weight, before = float(len(colours)), 0.0
-    if known is not None and known.samples > 0.0:
-        before = min(known.samples, MAX_SAMPLES)
-        mean = (before * np.array(known.mean) + weight * mean) / (before + weight)
-        covariance = (before * np.array(known.covariance) + weight * covariance) / (before + weight)
-    red, green, blue = (round(float(x), 1) for x in mean)
-    rows = [tuple(round(float(x), 9) for x in row) for row in covariance]
-    return FloorAppearance(locale, (red, green, blue), ((rows[0][0], rows[0][1], rows[0][2]), (
-        rows[1][0], rows[1][1], rows[1][2]), (rows[2][0], rows[2][1], rows[2][2])),
-        min(before + weight, MAX_SAMPLES))
-
-
 def _has_hue(appearance: Floats, expected: Floats, limit: float) -> NDArray[np.bool_]:
     """Which of the looks (..., 3) have the red and the blue of the expected ones (3,), within the limit."""
     red, blue = (np.abs(appearance[..., part] - expected[part]) <= limit for part in (1, 2))
@@ -142,7 +114,7 @@ def _has_hue(appearance: Floats, expected: Floats, limit: float) -> NDArray[np.b
 
 
 def _find_mode(appearance: Floats, expected: Floats | None, least: Floats) -> Floats:
-    """The most frequent brightness of looks (n, 3) and the median hue there; near what was learnt, if anything was."""
+    """The most frequent brightness of looks (n, 3) and the median hue there; near the expected, if it is."""
     sigma = math.sqrt(least[0, 0])
     values = appearance[:, 0]
     if expected is not None:

@@ -96,6 +96,18 @@ class FloorMap:
         odds = free + taken
         return MapAnswer(np.where(odds < -1e-6, 1.0 / (1.0 + np.exp(-np.minimum(odds, 0.0))), 1.0), sights, discs)
 
+    def draw(self) -> tuple[tuple[float, float], NDArray[np.uint8]]:
+        """Its lower left corner [m, world], and a picture (rows, columns) of its cells, the first row at the top: how
+        probably something stands there, in percent; 255 where nothing tells.
+        """
+        stamps = [stamp for sight in self._sights if (stamp := _stamp(sight)).odds.size]
+        if not stamps:
+            return (0.0, 0.0), np.full((1, 1), 255, np.uint8)
+        low = np.min([stamp.low for stamp in stamps], axis=0)
+        free, taken, _ = self._compose(low, np.max([stamp.low + stamp.odds.shape for stamp in stamps], axis=0) - low)
+        percent = np.where((free == 0.0) & (taken == 0.0), 255.0, 100.0 / (1.0 + np.exp(-free - taken)))
+        return (float(low[0] * CELL_M), float(low[1] * CELL_M)), percent.round().astype(np.uint8).T[::-1].copy()
+
     def _compose(self, low: Ints, shape: Ints) -> tuple[Cells, Cells, NDArray[np.int64]]:
         """A window of the map: log odds of what shows it free, and taken; and by which sight that is."""
         free, seen, heard = (np.zeros(shape, np.float32) for _ in range(3))

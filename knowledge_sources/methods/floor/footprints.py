@@ -35,6 +35,7 @@ NEARER = 0.7
 """A sight from less than this part of the distance of another is from clearly nearer."""
 MIN_COMMON_DIRECTIONS = 0.6
 """A sight without feet tells nothing new where this part of its directions is that of what is known."""
+OBSTACLE_DEPTH_M = 0.3  # depth that something is taken to have of which only the near side is seen
 MAX_FLOORS = 64
 REACH_M = 10.0
 """No thing is further off than this when it is seen."""
@@ -183,7 +184,7 @@ def join_shapes(known: ThingShape, new: ThingShape, free: shapely.Geometry, eye:
     """The shape of a thing by what is known and by a new sight from an ``eye`` (2,), which shows some floor ``free``.
 
     A sight of which the feet are not seen tells only in which directions the thing is: it adds to what is known in
-    directions in which nothing was known.
+    directions in which nothing was known, and there no more than what is next to that.
     """
     if new.from_m < NEARER * known.from_m:
         known_beside = shapely.difference(known.taken, _build_sector(new.taken, eye))
@@ -191,6 +192,8 @@ def join_shapes(known: ThingShape, new: ThingShape, free: shapely.Geometry, eye:
     if not math.isfinite(new.from_m):
         if measure_common_directions(known.taken, new.taken, eye) >= MIN_COMMON_DIRECTIONS:
             return known._replace(taken=take_free(known.taken, free))
+        beside = shapely.intersection(new.taken, shapely.buffer(known.taken, OBSTACLE_DEPTH_M))
+        new = new if beside.is_empty else new._replace(taken=beside)
     elif NEARER * new.from_m > known.from_m:
         return known
     return ThingShape(join_footprints(known.taken, new.taken, free), min(known.from_m, new.from_m))

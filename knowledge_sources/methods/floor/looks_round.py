@@ -49,11 +49,15 @@ def _compute_floor(building: Building, names: Sequence[str]) -> shapely.Geometry
 
 
 def sees(robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats) -> Mask:
-    """Which points (n, 2) of the floor the camera sees from a pose, with what may stand there, by the model."""
+    """Which points (n, 2) of the floor the camera sees from a pose, with what may stand there, by the model: those in
+    its picture to which a straight line leads over the open floor.
+    """
     seen = _is_in_picture(robot, pose, points)
-    rest = np.flatnonzero(seen)
-    if len(rest):
-        seen[rest] = _is_in_sight(robot, floor, pose, points[rest])
+    if seen.any():
+        eye = (pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)).position
+        ends = np.stack([np.broadcast_to(eye, points[seen].shape), points[seen]], axis=1)
+        shapely.prepare(floor)
+        seen[seen] = shapely.covers(floor, shapely.linestrings(ends))
     return seen
 
 
@@ -71,15 +75,6 @@ def measure_first_seen_m(robot: RobotModel) -> float:
     ahead_m = np.arange(0.0, MAX_FIRST_SEEN_M, CELL_M)
     seen = _is_in_picture(robot, Pose2(0.0, 0.0, 0.0), np.column_stack([ahead_m, np.zeros_like(ahead_m)]))
     return float(ahead_m[seen.argmax()])
-
-
-def _is_in_sight(robot: RobotModel, floor: shapely.Geometry, pose: Pose2, points: Floats) -> Mask:
-    """To which points a straight line leads over the open floor."""
-    ahead = np.array([math.cos(pose.heading_rad), math.sin(pose.heading_rad)])
-    eye = pose.position + robot.mount.forward_m * ahead
-    lines = shapely.linestrings(np.stack([np.broadcast_to(eye, points.shape), points], axis=1))
-    shapely.prepare(floor)
-    return np.asarray(shapely.covers(floor, lines))
 
 
 class Lookout(NamedTuple):

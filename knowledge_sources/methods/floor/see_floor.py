@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats, Ints
@@ -19,7 +19,6 @@ from knowledge_sources.methods.floor.appearance import (
     default_covariance,
     find_floor_in_shade,
     fit_appearance,
-    learn_appearance,
 )
 from knowledge_sources.methods.floor.looks_round import MAX_HIDDEN_M
 from knowledge_sources.methods.floor.model_floor import (
@@ -40,7 +39,7 @@ from knowledge_sources.methods.floor.standing_regions import (
     measure_height,
 )
 from knowledge_sources.settings import DEFAULT, FloorSettings, Settings
-from world_models.entries import FloorAppearance, FloorEnd, FloorThing, FreeFloor, Light
+from world_models.entries import FloorEnd, FloorThing, FreeFloor, Light
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -67,8 +66,6 @@ DOUBT_MARGIN_M = 0.15  # floor so near to what stands by one earlier picture alo
 MIN_DOUBTFUL_ROWS = 10  # of a column of the picture at half its size, from which that is so
 PART_SIGMA = 0.05  # of the part of the floor's distance at which the earlier picture shows a thing
 
-DRIVEN_HALF_WIDTH_M = 0.25
-"""Half the width of the strip that was driven over, from which the floor's looks are learnt."""
 CUT_SIGMA_M = 0.15
 """Of a foot that the picture's lower border cuts off: it is anywhere between where that starts and the robot's rim."""
 GREY = np.array([0.299, 0.587, 0.114], np.float32)
@@ -99,19 +96,17 @@ def see_free_floor(
     covariance: Floats,
     jpeg: bytes,
     earlier: Sequence[Seen],
-    appearances: Mapping[str, FloorAppearance],
     seen_s: float,
     settings: Settings = DEFAULT,
     last_light: Light | None = None,
-) -> tuple[FreeFloor, tuple[FloorAppearance, ...]]:
-    """How far the floor is free in each direction, what ends it, and what the floor looks like as learnt from it.
+) -> FreeFloor:
+    """How far the floor is free in each direction, and what ends it.
 
     Args:
         robot: on the floor of the locale.
         pose, covariance: of the robot and (3, 3) of (x, y, heading), world.
         jpeg: the picture as the lens made it.
-        earlier: pictures from before, the newest first: for parallax, and to learn from where it has driven since.
-        appearances: what is known of the floors' looks, by locale.
+        earlier: pictures from before, the newest first: for parallax.
         seen_s: when it was taken.
         last_light: that of a picture shortly before; None: of none.
 
@@ -125,25 +120,24 @@ def see_free_floor(
     eye = pose @ Pose2(robot.mount.forward_m, 0.0, 0.0)
     shown = read_picture(jpeg)
     if grid is None or is_dark(*compute_mean_and_deviation(shown.grey)):
-        return FreeFloor("camera", locale, eye.x_m, eye.y_m, (), (), (), (), (), (), seen_s), ()
+        return FreeFloor("camera", locale, eye.x_m, eye.y_m, (), (), (), (), (), (), seen_s)
     sigma_rad = math.sqrt(max(float(covariance[2, 2]), 0.0))
     margin_px = MODEL_MARGIN_PX + 2.0 * sigma_rad * robot.camera.fx
     sigma_m = math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0))
     model = predict_model_floor(
         robot, pose, grid, floor_m, MAX_ROLLED_OVER_M, margin_px, 2.0 * sigma_m * robot.camera.fx)
     picture = shown.rectified_half(robot.lens, robot.camera)
-    known = appearances.get(locale)
     if robot.camera.obstruction is not None:  # its looks are those of no floor
         model = model.behind(robot.camera.obstruction.covers(grid.pixels, MODEL_MARGIN_PX))
-    unlike, tells, light = find_unlike(picture[grid.top:], model, known, last_light)
+    unlike, tells, light = find_unlike(picture[grid.top:], model, last_light)
     unlike &= s.use_appearance
-    compare = _Comparison(robot, grid, model, unlike, picture, floor_m)
     alike = [seen for seen in earlier if abs(wrap_angle(seen.since.moved.heading_rad)) <= MAX_TURNED_RAD]
-    relief = compare(alike[0]) if s.use_parallax and alike else None
+    compare = cache(lambda k: _compare(alike[k], robot, grid, model, unlike, picture, floor_m))
+    relief = compare(0) if s.use_parallax and alike else None
     tested = tells
     if relief is not None and model.is_unknown.any():  # the motion alone tells what stands there
         by_motion = model.is_unknown | ~model.is_plain
-        elsewhere = [seen for seen in alike if seen.pose.distance_to(alike[0].pose) >= FLOOR_VIEW_DISTANCE_M]
+        elsewhere = [k for k, seen in enumerate(alike) if seen.pose.distance_to(alike[0].pose) >= FLOOR_VIEW_DISTANCE_M]
         again = compare(elsewhere[0]) if elsewhere and (by_motion & (relief.kinds == STANDING)).any() else None
         confirmed = model.is_unknown & relief.tells_of(np.full(grid.shape, _find_confirmed_part(grid)))
         sure = relief.agreeing(again, by_motion)
@@ -154,18 +148,17 @@ def see_free_floor(
     regions = find_regions(unlike, tested, grid, relief)
     reliefs = [] if relief is None else [relief]
     if reliefs and len(alike) > 1 and any(not (region.mask & unlike).any() for region in regions):
-        again = compare(alike[1])  # what looks like the floor is compared with one more picture
+        again = compare(1)  # what looks like the floor is compared with one more picture
         reliefs += [] if again is None else [again]
     built = [(region, _build_thing(region, grid, robot, pose, covariance, reliefs, unlike, s)) for region in regions]
     things = [(region, thing) for region, thing in built if thing is not None]
     scan = _scan(grid, model, tells, things, robot.camera.fy, s)
-    learnt = _learn(robot, locale, pose, earlier, known, floor_m)
     return FreeFloor(
         sense="camera", locale=locale, x_m=round(eye.x_m, 4), y_m=round(eye.y_m, 4),
         bearings_rad=tuple(round(math.remainder(pose.heading_rad + b, math.tau), 5) for b in scan.bearings_rad),
         near_m=scan.near_m, far_m=scan.far_m, ends=scan.ends, sigma_m=scan.sigma_m,
         things=tuple(thing for _, thing in things), seen_s=seen_s, light=light,
-        confirmed_m=_measure_confirmed_m(grid, relief)), learnt
+        confirmed_m=_measure_confirmed_m(grid, relief))
 
 
 def _keep_off(doubtful_m: Floats, robot: RobotModel) -> Floats:
@@ -182,36 +175,24 @@ def _keep_off(doubtful_m: Floats, robot: RobotModel) -> Floats:
     return np.asarray(free_m)
 
 
-class _Comparison:
-    """Compares a picture with earlier ones."""
-
-    def __init__(self, robot: RobotModel, grid: FloorGrid, model: ModelFloor, unlike: NDArray[np.bool_],
-                 picture: NDArray[np.uint8], floor_m: float) -> None:
-        self._robot, self._grid, self._model, self._picture, self._floor_m = robot, grid, model, picture, floor_m
-        self._is_floor, self._found = model.is_plain & ~unlike, dict[int, Relief | None]()
-
-    def __call__(self, then: Seen) -> Relief | None:
-        """The relief by an earlier picture; compared once with each."""
-        if id(then) not in self._found:
-            self._found[id(then)] = self._compare(then)
-        return self._found[id(then)]
-
-    def _compare(self, then: Seen) -> Relief | None:
-        robot, grid, model, since = self._robot, self._grid, self._model, then.since
-        before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
-        now, earlier = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (self._picture, before))
-        both = TwoPictures(grid, now, earlier, since.moved, robot.camera, robot.mount)
-        modelled = None
-        if model.is_unknown.any():
-            old = predict_model_floor(robot, then.pose, grid, self._floor_m, MAX_ROLLED_OVER_M, MODEL_MARGIN_PX)
-            modelled = Modelled(model.ranges_m, model.standing_m, old.standing_m)
-        relief = find_relief(both, self._is_floor, since.sigma_m, since.sigma_rad, modelled)
-        return relief if relief is None or modelled is not None else relief.beside(~model.is_plain)
+def _compare(
+    then: Seen, robot: RobotModel, grid: FloorGrid, model: ModelFloor, unlike: NDArray[np.bool_],
+    picture: NDArray[np.uint8], floor_m: float,
+) -> Relief | None:
+    """The relief of a picture by an earlier one."""
+    before = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)
+    now, earlier = (np.asarray(image.astype(np.float32) @ GREY, np.float32) for image in (picture, before))
+    both = TwoPictures(grid, now, earlier, then.since.moved, robot.camera, robot.mount)
+    modelled = None
+    if model.is_unknown.any():
+        old = predict_model_floor(robot, then.pose, grid, floor_m, MAX_ROLLED_OVER_M, MODEL_MARGIN_PX)
+        modelled = Modelled(model.ranges_m, model.standing_m, old.standing_m)
+    relief = find_relief(both, model.is_plain & ~unlike, then.since.sigma_m, then.since.sigma_rad, modelled)
+    return relief if relief is None or modelled is not None else relief.beside(~model.is_plain)
 
 
 def find_unlike(
-    picture: NDArray[np.uint8], model: ModelFloor, known: FloorAppearance | None,
-    last_light: Light | None = None,
+    picture: NDArray[np.uint8], model: ModelFloor, last_light: Light | None = None
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Light | None]:
     """Which pixels (rows, columns) do not look like the floor that the model has there, where that tells anything, and
     the light of the picture; None where it is not known.
@@ -229,12 +210,7 @@ def find_unlike(
         here = model.is_plain & (model.kinds == kind)
         by_model = compute_appearance(255.0 * model.colours[kind])
         if shift is None:
-            guesses = [(compute_appearance(np.array(known.mean)), True)] if known and known.samples > 0.0 else []
-            if last_light is None:
-                guesses += [(by_model, False)]
-            else:
-                guesses += [(by_model + last_light, True), (by_model + last_light, False)]
-            fitted = _fit_most(appearance, here, guesses, may_be_tinted=last_light is None)
+            fitted = _fit_most(appearance, here, by_model, last_light)
             if fitted is None:
                 continue
             mean, floor = fitted
@@ -253,31 +229,27 @@ def find_unlike(
 
 
 def _fit_most(
-    appearance: Floats, here: NDArray[np.bool_], guesses: Sequence[tuple[Floats, bool]], *,
-    may_be_tinted: bool
+    appearance: Floats, here: NDArray[np.bool_], by_model: Floats, last_light: Light | None
 ) -> tuple[Floats, NDArray[np.bool_]] | None:
-    """Mean of the looks of the floor ``here`` and which pixels look like it, by the first of the guesses (as
-    ``expected`` and ``is_learnt`` of :func:`fit_appearance`) that some of it agrees with; None where none is known.
+    """Mean of the looks of the floor ``here`` and which pixels look like it, in the light of the last picture or in any
+    other; None where none is known.
 
     Where hardly any of it agrees, the camera's white balance may differ from the model's: what most of it looks like
     then is the floor, if it has about the floor's hue. That is so only where no picture was taken shortly before: white
     balance follows the light little by little, and what fills the picture all at once is a thing.
     """
     seen, size = appearance[here], np.count_nonzero(here)
+    expected = by_model if last_light is None else by_model + last_light
+    guesses = [(False, MAX_CHROMA_ERROR, MIN_FLOOR_SHARE)]
+    guesses = [*guesses, (False, MAX_TINT, MIN_TINTED_SHARE)] if last_light is None else [
+        (True, MAX_CHROMA_ERROR, MIN_FLOOR_SHARE), *guesses]
     first: tuple[Floats, NDArray[np.bool_]] | None = None
-
-    def find_floor(fit: tuple[Floats, Floats] | None) -> tuple[Floats, NDArray[np.bool_]] | None:
-        return None if fit is None else (fit[0], find_floor_in_shade(appearance, here, *fit))
-
-    for expected, is_learnt in guesses:
-        found = find_floor(fit_appearance(seen, expected, is_learnt))
-        if found is not None and np.count_nonzero(found[1]) >= MIN_FLOOR_SHARE * size:
+    for is_lit, limit, share in guesses:
+        fit = fit_appearance(seen, expected, is_lit, limit)
+        found = None if fit is None else (fit[0], find_floor_in_shade(appearance, here, *fit))
+        if found is not None and np.count_nonzero(found[1]) >= share * size:
             return found
-        first = first or found
-    for expected, _ in guesses if may_be_tinted else ():
-        found = find_floor(fit_appearance(seen, expected, False, MAX_TINT))
-        if found is not None and np.count_nonzero(found[1]) >= MIN_TINTED_SHARE * size:
-            return found
+        first = first or (found if limit == MAX_CHROMA_ERROR else None)
     return first
 
 
@@ -419,27 +391,3 @@ def _build_thing(
         p_thing=min(most_p, round(odds / (1.0 + odds), 4)),
         box_px=(float(left), float(top), float(right), float(bottom)), evidence=how, is_cut=region.is_cut,
         is_camouflaged=looks_like_floor)
-
-
-def _learn(
-    robot: RobotModel, locale: str, pose: Pose2, earlier: Sequence[Seen], known: FloorAppearance | None, floor_m: float,
-) -> tuple[FloorAppearance, ...]:
-    """What the floor looks like where the robot has driven since the oldest picture, as that picture shows it."""
-    if not earlier:
-        return ()
-    then = earlier[-1]
-    now = then.pose.inverse() @ pose
-    grid = build_floor_grid(robot.camera, robot.mount, robot.mount.height_m - floor_m, SIGHT_PART * SIGHT_M)
-    if grid is None or now.x_m <= 0.0:
-        return ()
-    away = math.hypot(*now.position)
-    ahead, aside = (grid.points_robot @ np.array(axis) / away for axis in (now.position, (-now.y_m, now.x_m)))
-    driven = (ahead > 0.0) & (ahead < away) & (np.abs(aside) < DRIVEN_HALF_WIDTH_M)
-    if driven.any():  # of this locale only: the next one may have another floor
-        there = then.pose.apply(grid.points_robot[driven])
-        driven[driven] = shapely.contains_xy(shapely.Polygon(robot.world.outline(locale)), there)
-    if not driven.any():
-        return ()
-    colours = read_picture(then.jpeg).rectified_half(robot.lens, robot.camera)[grid.top:][driven].astype(float)
-    learnt = learn_appearance(known, locale, colours)
-    return () if learnt is None or learnt == known else (learnt,)

@@ -24,7 +24,9 @@ MAX_THING_DEPTH_M = 0.8  # feet of one thing are at most so much further than it
 CUT_DEPTH_M = 0.15  # the same where the lower border of the picture cuts it off
 
 MIN_BORDER_COLUMNS = 6
-"""Fewer columns of a lower border that is seen to stand do not tell that it hangs over the floor."""
+"""Fewer columns that are seen to stand tell nothing of those beside them."""
+MIN_AGREEING_COLUMNS, RANGE_ERROR = 3, 0.12
+"""So many columns beside each other tell how far what stands is, if they agree to this part of that."""
 MIN_ROWS = 3
 """A region of fewer rows is noise."""
 MAX_STEP = 0.06
@@ -95,9 +97,13 @@ def _describe_region(
     last = mask.shape[0] - 1
     # what is seen to stand stands at its own distance, though its foot looks like the floor or is not in the picture
     seeming = grid.ranges_m[lowest, columns]
-    part = _find_border_part(lowest, columns, parts, kinds)
-    ranges = np.minimum(part * seeming, _measure_standing_m(mask[:, columns], (grid.ranges_m * parts)[:, columns],
-                                                     parts[:, columns]))
+    standing_m = _agree(_measure_standing_m(mask[:, columns], (grid.ranges_m * parts)[:, columns], parts[:, columns]))
+    told = np.flatnonzero(np.isfinite(standing_m))
+    if len(told) >= MIN_BORDER_COLUMNS:  # where no foot is to be seen, it is as far as that of the nearest column is
+        beside = told[np.argmin(np.abs(columns[:, None] - columns[told]), axis=1)]
+        hangs = (lowest >= last - 1) | _is_border_standing(lowest, columns, parts, kinds)
+        standing_m = np.where(hangs, standing_m[beside], standing_m)
+    ranges = np.minimum(seeming, standing_m)
     is_confirmed = ranges < seeming
     cut = (lowest >= last - 1) & ~is_confirmed
     # below a foot there is floor; where the model's own parts begin there, it is no foot
@@ -118,20 +124,17 @@ def _describe_region(
     return StandingRegion(mask, feet, parts_of, bool(cut[is_foot].any()), is_clipped, top)
 
 
-def _find_border_part(
+def _is_border_standing(
     lowest: NDArray[np.intp], columns: NDArray[np.intp], parts: NDArray[np.float32], kinds: NDArray[np.uint8]
-) -> float:
-    """How far the lower border of a region is, as a part of the distance of the floor that it hides; 1: it is on it.
+) -> bool:
+    """Whether the lower border of a region stands: it hangs over the floor, as that of a shelf on legs.
 
-    The lower border of what hangs over the floor, as a shelf on legs, stands. All of it is taken to be at one height.
+    Not all of it is at one height then: a leg is a part of it.
     """
     rows = np.clip(lowest[:, None] + np.arange(-2, 3), 0, kinds.shape[0] - 1)
     seen, at = kinds[rows, columns[:, None]], parts[rows, columns[:, None]]
-    standing = (seen == STANDING) & (at < 1.0)
-    counted = np.count_nonzero(standing.any(axis=1))
-    if counted < MIN_BORDER_COLUMNS or counted <= np.count_nonzero((seen == FLAT).any(axis=1)):
-        return 1.0
-    return float(np.median(at[standing]))
+    counted = np.count_nonzero(((seen == STANDING) & (at < 1.0)).any(axis=1))
+    return bool(counted >= MIN_BORDER_COLUMNS and counted > np.count_nonzero((seen == FLAT).any(axis=1)))
 
 
 def _measure_standing_m(mask: NDArray[np.bool_], ranges_m: Floats, parts: NDArray[np.float32]) -> Floats:
@@ -148,6 +151,16 @@ def _measure_standing_m(mask: NDArray[np.bool_], ranges_m: Floats, parts: NDArra
     known = np.sort(around, axis=1)
     middle = known[np.arange(len(own)), np.maximum(np.isfinite(around).sum(axis=1) - 1, 0) // 2]
     return np.where(counts > 0, middle, np.inf)
+
+
+def _agree(standing_m: Floats) -> Floats:
+    """The same (k,) without the few columns that no other bears out, where many agree: their texture is like itself."""
+    told = np.flatnonzero(np.isfinite(standing_m))
+    is_same = np.abs(np.log(standing_m[told, None] / standing_m[told])) <= RANGE_ERROR
+    agreeing = np.count_nonzero(is_same, axis=1)
+    if agreeing.max(initial=0) >= MIN_BORDER_COLUMNS:
+        standing_m[told[agreeing < MIN_AGREEING_COLUMNS]] = np.inf
+    return standing_m
 
 
 def _find_feet(

@@ -14,6 +14,7 @@ import shapely
 from knowledge_sources.methods.belief import add_evidence, to_log_odds
 from knowledge_sources.methods.floor.floor_map import BEAM_RAD
 from knowledge_sources.methods.floor.footprints import (
+    OBSTACLE_DEPTH_M,
     ThingShape,
     build_free_floor,
     build_polygon,
@@ -62,7 +63,7 @@ MIN_WAY_M = FLOOR_VIEW_DISTANCE_M / 2.0  # what is seen, or missed, from nearer 
 MAX_OBSTACLE_SIGMA_M = 0.25
 """What is seen on the floor with a larger standard deviation is waited for until it is nearer."""
 MAX_HULL_PART = 1.5  # two sights are of one thing where the hull round both is at most so much larger than both
-OBSTACLE_DEPTH_M = 0.3  # depth that something is taken to have of which only the near side is seen
+MAX_VAGUER = 2.0  # a sight that is less sure by this factor of where a thing is tells only its directions
 MIN_PART_UNEXPLAINED = 0.3  # of a thing that was not known: what walls and things of the model do not explain
 SEEN_AGAIN_S = 2.0  # what tells nothing new is noted again after so long
 
@@ -286,7 +287,8 @@ def see_again(
     told = _explain(sight, known.name, thing, shown, s) if is_further else None
     difference = sight.know(known.name) if told is None else sight.weigh(told)
     judged = known if told is None else judge_thing(known, difference, s)
-    joined = _join_sight(sight, known, shape, free)
+    is_vague = thing.sigma_m > MAX_VAGUER * known.sigma_m
+    joined = _join_sight(sight, known, shape._replace(from_m=math.inf) if is_vague else shape, free)
     footprint = list_corners(joined.taken)
     moved = measure_change_m(known.footprint, footprint) >= s.min_footprint_change_m
     surer = abs(judged.certainty - known.certainty) > 0.005 or judged.status != known.status

@@ -47,24 +47,25 @@ def find_free_space(
 def compute_free_space(
     outline: Any, obstacles: Sequence[Any], clearance_m: float, *, is_round: bool = False
 ) -> shapely.Geometry:
-    """Where the robot's centre may be: the room's polygon (k, 2) shrunk, less the obstacles' (k, 2) grown.
+    """Where the robot's centre may be: the room's polygon (k, 2) shrunk, less the obstacles' (k, 2) grown."""
+    room = shapely.Polygon(np.asarray(outline, float)).buffer(-clearance_m, join_style="mitre")
+    return room.difference(grow_obstacles(obstacles, clearance_m, is_round=is_round)) if len(obstacles) else room
+
+
+def grow_obstacles(obstacles: Sequence[Any], clearance_m: float, *, is_round: bool = False) -> shapely.Geometry:
+    """What is so near to obstacles, each of (k, 2) corners.
 
     Ways round few corners have few legs: what is no rectangle is grown as the smallest rectangle round it, and corners
     stay corners. With ``is_round`` all of the floor is free that is: obstacles are grown as they are, round at corners.
     """
-    room = shapely.Polygon(np.asarray(outline, float)).buffer(-clearance_m, join_style="mitre")
-    if not len(obstacles):
-        return room
     rings = shapely.linearrings(np.concatenate([np.asarray(o, float) for o in obstacles]),
                                 indices=np.repeat(np.arange(len(obstacles)), [len(o) for o in obstacles]))
     polygons = shapely.polygons(rings)
     if is_round:
-        grown = shapely.buffer(polygons, clearance_m, quad_segs=CORNER_STEPS)
-    else:
-        other = np.array([len(corners) != 4 for corners in obstacles])
-        polygons[other] = shapely.oriented_envelope(polygons[other])
-        grown = shapely.buffer(polygons, clearance_m, join_style="mitre")
-    return room.difference(shapely.union_all(grown))
+        return shapely.union_all(shapely.buffer(polygons, clearance_m, quad_segs=CORNER_STEPS))
+    other = np.array([len(corners) != 4 for corners in obstacles])
+    polygons[other] = shapely.oriented_envelope(polygons[other])
+    return shapely.union_all(shapely.buffer(polygons, clearance_m, join_style="mitre"))
 
 
 def is_clear(free: shapely.Geometry, a: Any, b: Any) -> bool:
@@ -174,15 +175,11 @@ def find_bends(free: shapely.Geometry) -> Floats:
     found = [np.zeros((0, 2))]
     for part in shapely.get_parts(free):
         if not part.is_empty:
-            rings = orient(part)
-            found += [_find_reflex(np.asarray(ring.coords)[:-1, :2]) for ring in (rings.exterior, *rings.interiors)]
+            rings = orient(part)  # their inside is on their left
+            for ring in (np.asarray(line.coords)[:-1, :2] for line in (rings.exterior, *rings.interiors)):
+                before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+                found.append(ring[before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0])
     return _drop_duplicates(np.concatenate(found))
-
-
-def _find_reflex(ring: Floats) -> Floats:
-    """The corners (n, 2) of a ring at which it turns right; its interior is on its left."""
-    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    return np.asarray(ring[before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0.0])
 
 
 def _drop_duplicates(points: Floats) -> Floats:

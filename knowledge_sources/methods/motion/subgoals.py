@@ -15,11 +15,11 @@ from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.floor import build_polygon, find_floor, measure_first_seen_m
 from knowledge_sources.methods.floor.looks_round import JOINT_M
 from knowledge_sources.methods.motion.routes import (
-    compute_free_space,
     find_free_space,
     find_line_through,
     find_nearest,
     find_shortest_route,
+    grow_obstacles,
     is_clear,
     list_lookouts,
 )
@@ -123,23 +123,11 @@ class SubgoalPlanner:
             route = self._building.route(here.locale, destination.locale, avoided)
             if route is None:
                 continue
-            blocked = self._find_blocked(route, here, destination, diagonal)
+            subgoals, blocked = self._plan_route(route, here, destination, tolerance_m, diagonal)
             if not blocked:
-                return self._plan_route(route, here, destination, tolerance_m, diagonal)
+                return tuple(subgoals)
             todo += [(*avoided, passage) for passage in blocked]
         return None
-
-    def _find_blocked(self, route: Route, here: Place, destination: Place, diagonal: bool) -> list[Passage]:
-        """The passages at the ends of the first part of a route on which obstacles leave no way, if any."""
-        came: Passage | None = None
-        for step, rooms_m in zip(route.steps, self._measure_rooms_m(route, here, destination), strict=True):
-            ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, diagonal)
-            if ends is None:
-                return [step.passage]
-            if not self._has_way(here, ends.before):
-                return [step.passage, *([] if came is None else [came])]
-            here, came = ends.behind, step.passage
-        return [came] if came is not None and not self._has_way(here, destination) else []
 
     def _has_way(self, here: Place, there: Place) -> bool:
         """Whether a way leads round the obstacles of one room; where there are none, the model says so already."""
@@ -150,19 +138,23 @@ class SubgoalPlanner:
 
     def _plan_route(
         self, route: Route, here: Place, destination: Place, tolerance_m: float, diagonal: bool
-    ) -> tuple[Subgoal, ...] | None:
+    ) -> tuple[list[Subgoal], list[Passage]]:
+        """Subgoals along a route; or the passages at the ends of the first part of it on which obstacles leave no way.
+        """
         subgoals: list[Subgoal] = []
+        came: list[Passage] = []
         for step, rooms_m in zip(route.steps, self._measure_rooms_m(route, here, destination), strict=True):
             ends = self._find_ends(step.passage, step.origin, step.destination, rooms_m, diagonal)
-            if ends is None:
-                return None
+            if ends is None or not self._has_way(here, ends.before):
+                return [], [step.passage, *(() if ends is None else came)]
             subgoals.append(self._build_subgoal(here, ends.before, ends.tolerance_m))
             on_wheels = not isinstance(step.passage, Link)  # else it is a ride: there is nothing to drive
             subgoals.append(
                 Subgoal(ends.before, ends.behind, on_wheels, step.passage.name, WAY_TOLERANCE_M))
-            here = ends.behind
-        subgoals.append(self._build_subgoal(here, destination, tolerance_m))
-        return tuple(subgoals)
+            here, came = ends.behind, [step.passage]
+        if came and not self._has_way(here, destination):
+            return [], came
+        return [*subgoals, self._build_subgoal(here, destination, tolerance_m)], []
 
     def _measure_rooms_m(self, route: Route, here: Place, destination: Place) -> list[tuple[float, float]]:
         """How far from each passage of a route the robot may turn to it, and leave it, without turning back: as far as
@@ -347,23 +339,18 @@ class SubgoalPlanner:
 
     def _list_free_spaces(self, locale: str) -> Iterator[Geometry]:
         """Where the robot's centre may be, with ever smaller margins."""
-        margins_m = CLEARANCES_M
         if locale in self._cluttered:
             yield self._find_wide_space(locale)
-        for margin_m in margins_m:
+        for margin_m in CLEARANCES_M:
             yield self._free_space(locale, margin_m)
-        yield self._free_space(locale, margins_m[-1], is_round=True)
+        yield self._free_space(locale, CLEARANCES_M[-1], is_round=True)
 
     def _find_wide_space(self, locale: str) -> Geometry:
         """Where the robot's centre may be with more room to what the model lacks: its top may be wider than its feet.
         """
-        s = self._settings
+        away_m = self._robot.radius_m + CLEARANCES_M[0] + self._settings.overhang_m
         found = [obstacle.footprint for obstacle in self._obstacles if obstacle.locale == locale]
-        low_x, low_y, high_x, high_y = shapely.bounds(shapely.multipoints(np.asarray(self._building.outline(locale))))
-        away_m = self._robot.radius_m + CLEARANCES_M[0] + s.overhang_m
-        around = shapely.box(*(np.array([low_x, low_y, high_x, high_y]) + away_m * np.array([-2.0, -2.0, 2.0, 2.0])))
-        clear = compute_free_space(shapely.get_coordinates(around)[:-1], found, away_m)
-        return shapely.intersection(self._free_space(locale, CLEARANCES_M[0]), clear)
+        return shapely.difference(self._free_space(locale, CLEARANCES_M[0]), grow_obstacles(found, away_m))
 
     def _is_passed(self, middle: Floats, before: Floats, locale: str) -> bool:
         """Whether the robot clears all obstacles of a locale between a doorway and a place before it."""

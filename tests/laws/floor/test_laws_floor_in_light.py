@@ -46,7 +46,7 @@ def test_a_tinted_picture_has_floor_and_a_thing_on_it(red: float, blue: float, g
     picture = np.clip(shaded(np.full(SHAPE, gain)) * (red, 1.0, blue), 0.0, 255.0)
     picture[40:60, 70:95] = np.clip(picture[40:60, 70:95] * (0.45, 0.3, 0.3), 0.0, 255.0)
     model = MODEL
-    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None)
+    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model)
     if gain * 110.0 * max(red, 1.0, blue) < 250.0 and tells.any():
         assert unlike[43:57, 73:92].mean() > 0.95
         assert unlike[:38].mean() < 0.02
@@ -59,10 +59,10 @@ def test_a_thing_that_fills_the_picture_at_once_is_not_the_floor_in_other_light(
 ) -> None:
     model = MODEL
     picture = shaded(np.ones(SHAPE))
-    _, _, light = find_unlike(picture.astype(np.uint8), model, None)
+    _, _, light = find_unlike(picture.astype(np.uint8), model)
     assert light is not None and np.allclose(light, 0.0, atol=0.1)
     picture[:, :width] = np.clip(picture[:, :width] * (red, 0.8, blue), 0.0, 255.0)
-    unlike, _, _ = find_unlike(picture.astype(np.uint8), model, None, light)
+    unlike, _, _ = find_unlike(picture.astype(np.uint8), model, light)
     assert unlike[:, : width - 3].mean() > 0.95
     assert unlike[:, width + 3 :].mean() < 0.02
 
@@ -74,7 +74,7 @@ def test_white_balance_that_changes_little_by_little_is_followed(red: float, blu
     light = None
     for part in np.linspace(0.0, 1.0, 12):
         gains = (red**part, 1.0, blue**part)
-        unlike, tells, light = find_unlike((shaded(np.ones(SHAPE)) * gains).astype(np.uint8), model, None, light)
+        unlike, tells, light = find_unlike((shaded(np.ones(SHAPE)) * gains).astype(np.uint8), model, light)
         assert tells.all() and unlike.mean() < 0.02
 
 
@@ -87,6 +87,6 @@ def test_what_hides_most_of_the_picture_is_not_taken_for_the_floor(left: int, ab
     hidden[above:, left:] = True
     picture[hidden] = 104.0 * gain
     model = MODEL.behind(hidden)
-    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model, None)
+    unlike, tells, _ = find_unlike(picture.astype(np.uint8), model)
     assert not tells[hidden].any() and tells[~hidden].all()
     assert unlike[:, : left - 2].mean() < 0.02

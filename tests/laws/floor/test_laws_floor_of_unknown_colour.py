@@ -117,7 +117,7 @@ def see(texture: Texture, seed: int, turned_rad: float, board_m: float | None = 
         moved, (dx, dy, turn) = pose.inverse() @ now, rng.normal(0.0, (0.003, 0.003, 0.002))
         told = Pose2(moved.x_m + dx, moved.y_m + dy, moved.heading_rad + turn)
         earlier.append(Seen(jpeg, pose, MotionBetween(told, 0.003, 0.002)))
-    return see_free_floor(robot(), "room", now, COVARIANCE, jpegs[2], earlier, {}, 1.0)[0]
+    return see_free_floor(robot(), "room", now, COVARIANCE, jpegs[2], earlier, 1.0)
 
 
 @pytest.mark.parametrize("texture", [checker, planks, carpet])  # tiles: a known fault, docs/status.md
@@ -152,7 +152,7 @@ def test_what_stands_on_it_is_a_thing_there_and_ends_the_free_floor(
 
 def test_without_an_earlier_picture_nothing_is_told() -> None:
     here = Pose2(2.0, 3.0, 0.0)
-    floor = see_free_floor(robot(), "room", here, COVARIANCE, draw(checker, 0, 0.3, here), [], {}, 1.0)[0]
+    floor = see_free_floor(robot(), "room", here, COVARIANCE, draw(checker, 0, 0.3, here), [], 1.0)
     assert floor.things == () and set(floor.far_m) == {0.0}
 
 

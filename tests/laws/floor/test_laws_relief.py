@@ -211,6 +211,28 @@ def test_what_hangs_over_the_floor_is_as_near_as_its_height_makes_it(
 
 
 @settings(max_examples=20, deadline=None)
+@given(st.floats(1.2, 2.2), st.floats(0.3, 0.5), st.integers(3, 12), st.integers(0, 30), SEEDS)
+def test_a_seat_and_its_leg_stand_equally_far_away(at_m: float, low_m: float, leg: int, seen: int, seed: int) -> None:
+    """Though the leg's foot is lower in the picture than the seat, and only the seat is seen to stand; and a few
+    pixels elsewhere seem to be much nearer.
+    """
+    high_m = MOUNT.height_m * (1.0 - at_m / GRID.ranges_m)
+    columns = np.arange(SIZE)
+    mask = (high_m >= 0.0) & (high_m < 0.7) & (np.abs(columns - 128) < 30)
+    mask &= (high_m > low_m) | (columns - 98 < leg)
+    noise = np.random.default_rng(seed).normal(1.0, 0.02, GRID.shape)
+    is_seen = mask & (high_m > low_m) & (columns > 99 + leg) & (columns < 150 + seen)
+    parts = np.where(is_seen, np.minimum(at_m / GRID.ranges_m * noise, 0.95), 1.0)
+    chance = mask & (columns > 154) & (columns < 157) & (seen < 4)
+    parts = np.where(chance, 0.4, parts).astype(np.float32)
+    kinds = np.where(parts < 1.0, STANDING, 0).astype(np.uint8)
+    region, = find_regions(mask, EVERYWHERE, GRID, Relief(kinds, parts, np.ones(GRID.shape, np.float32)))
+    feet_m = GRID.ranges_m[tuple(region.feet.T)] * region.parts
+    assert np.abs(feet_m / at_m - 1.0).max() < 0.15
+    assert len(feet_m) > 50
+
+
+@settings(max_examples=20, deadline=None)
 @given(st.floats(1.7, 2.6), st.floats(-0.5, 0.5), st.floats(0.15, 0.4), MOVES_M)
 def test_what_lies_flat_is_told_to(
     x_m: float, y_m: float, half_m: float, moved_m: float

@@ -66,6 +66,15 @@ def test_no_picture_takes_back_what_was_touched(touched_s: float | None) -> None
     assert build_polygon(new.footprint).symmetric_difference(wanted).area < 5e-3
 
 
+@pytest.mark.parametrize("sigma_m", [0.09, 0.11])
+def test_a_sight_that_is_twice_as_vague_moves_no_footprint(sigma_m: float) -> None:
+    """Though it is nearer; one that is nearly as sure does."""
+    near = ThingShape(build_polygon(box(3.2, 2.0, 0.3, 0.3)), 1.4)
+    new = look(known=replace(THING, seen_from_m=4.0), sigma_m=sigma_m, shape=near)
+    assert new is not None
+    assert (build_polygon(new.footprint).symmetric_difference(build_polygon(WHOLE)).area < 5e-3) == (sigma_m > 0.1)
+
+
 @pytest.mark.parametrize("sigmas", [(0.03, 0.04), (0.04, 0.03), (0.0, 0.05), (0.12, 0.05)])
 @pytest.mark.parametrize("more", [-1e-3, 1e-3])
 @pytest.mark.parametrize("side", [1.0, -1.0])

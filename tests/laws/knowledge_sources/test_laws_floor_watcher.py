@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Effect, Entry, Post, Revise
+from blackboard import Effect, Entry, Post
 from generated_boards import Bench, made, reasons, to_world
-from harvey.testing import HALL, STUDY, check_source, plain_robot
+from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.methods.floor import FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD
 from knowledge_sources.model import floor_watcher
 from knowledge_sources.model.floor_watcher import (
@@ -30,7 +30,6 @@ from world_models.entries import (
     CameraPicture,
     Course,
     Drift,
-    FloorAppearance,
     FloorView,
     FreeFloor,
     Hypothesis,
@@ -51,20 +50,15 @@ def floor(seen_s: float = NOW_S, light: Light | None = None, at: Pose2 = HERE, s
                      light)
 
 
-def looks(locale: str, samples: float = 1.0) -> FloorAppearance:
-    return FloorAppearance(locale, (1.0, 2.0, 3.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), samples)
-
-
 @dataclass
 class Eye:
-    """In place of the method: what it was asked, and what it says that it has learnt."""
+    """In place of the method: what it was asked."""
 
-    learnt: tuple[FloorAppearance, ...] = ()
     asked: list[tuple[Any, ...]] = field(default_factory=list)
 
-    def __call__(self, *asked: Any) -> tuple[FreeFloor, tuple[FloorAppearance, ...]]:
+    def __call__(self, *asked: Any) -> FreeFloor:
         self.asked.append(asked)
-        return floor(), self.learnt
+        return floor()
 
 
 @pytest.fixture
@@ -145,8 +139,8 @@ def test_it_compares_with_the_pictures_kept_from_far_enough_by_this_belief_on_th
     assert effects is not None and room.frame is not None
     kept = [e for e, (_, floor_m, belief) in zip(put, drawn, strict=True) if floor_m == 0.0 and belief is None]
     far = [e for e in reversed(kept) if abs(float(room.bench.view[e.value.frame].value.jpeg)) > FLOOR_VIEW_DISTANCE_M]
-    ((robot, locale, pose, _, jpeg, earlier, known, seen_s, _, light),) = eye.asked
-    assert (locale, jpeg, known, seen_s, light) == (HALL, b"now", {}, NOW_S, None)
+    ((robot, locale, pose, _, jpeg, earlier, seen_s, _, light),) = eye.asked
+    assert (locale, jpeg, seen_s, light) == (HALL, b"now", NOW_S, None)
     assert math.dist(pose.position, to_world(HERE).position) < 1e-9 and robot.world.floor_m(HALL) == 0.0
     assert [seen.jpeg for seen in earlier] == [room.bench.view[e.value.frame].value.jpeg for e in far]
     held = HELD.of(room.bench.view)
@@ -184,22 +178,6 @@ def test_it_names_the_reports_of_the_wheels_and_their_drift(eye: Eye) -> None:
     assert {drift.id, *(report.id for report in reports)} <= reasons(seen) and before.id not in reasons(seen)
 
 
-def test_it_is_told_the_looks_of_floors_and_revises_what_it_learns(eye: Eye) -> None:
-    eye.learnt = (looks(HALL, 9.0), looks("porch", 2.0))
-    room = Room()
-    hall, study = room.bench.put(looks(HALL)), room.bench.put(looks(STUDY))
-    far = room.view(0.9)
-    effects = room.look() or ()
-    assert room.frame is not None
-    assert eye.asked[0][6] == {HALL: hall.value, STUDY: study.value}
-    seen, revised, new = effects[:3]
-    base = {room.frame.id, room.belief.id, far.id}
-    assert reasons(seen) == base | {hall.id}
-    assert isinstance(revised, Revise) and revised.entry.id == hall.id and revised.value == looks(HALL, 9.0)
-    assert reasons(revised) == base | {hall.id}
-    assert isinstance(new, Post) and new.value == looks("porch", 2.0) and reasons(new) == base
-
-
 @pytest.mark.parametrize("more_s", [-SMALL, SMALL])
 def test_the_light_of_a_picture_tells_that_of_those_shortly_after(eye: Eye, more_s: float) -> None:
     room, light = Room(), (0.1, 0.0, 0.0)
@@ -207,12 +185,11 @@ def test_the_light_of_a_picture_tells_that_of_those_shortly_after(eye: Eye, more
     dark = room.bench.put(floor(NOW_S - 1.0))
     effects = room.look() or ()
     is_told = more_s < 0.0
-    assert eye.asked[0][9] == (light if is_told else None)
+    assert eye.asked[0][8] == (light if is_told else None)
     assert (told.id in reasons(effects[0])) == is_told and dark.id not in reasons(effects[0])
 
 
 def test_it_keeps_the_laws_of_all_sources(eye: Eye) -> None:
     room = Room()
     room.view(0.9)
-    room.bench.put(looks(HALL))
     check_source(FloorWatcher, room.bench, room.bench.put(CameraPicture(b"now", 1, NOW_S, "track")))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from logs.recording.loggers.surroundings.found import UNKNOWN_HEIGHT_M, colour_of, edges, outlines
+from knowledge_sources.methods.floor import CELL_M, FloorMap
+from logs.recording.loggers.surroundings.found import UNKNOWN_HEIGHT_M, colour_of, edges
 from logs.recording.palette import EXPECTED, REJECTED
 from world_models.entries import FreeFloor, Obstacle
 
@@ -28,11 +30,13 @@ def test_an_obstacle_is_the_redder_the_more_certain_it_is() -> None:
     assert colour_of(BOX)[3] > colour_of(replace(BOX, status="suspected"))[3]
 
 
-def test_free_floor_is_outlined_where_it_is_free() -> None:
-    floor = FreeFloor("camera", "hallway", 1.0, 2.0, (0.0, 0.1, 0.2, 0.3, 0.4), (1.0, 1.0, 1.0, 1.0, 1.0),
-                      (2.0, 3.0, 0.5, 2.0, 2.0), ("thing", "sight", "thing", "sight", "model"), (0.1,) * 5, (), 0.0)
-    outline, other = outlines(floor)
-    assert np.allclose(outline[0], outline[-1])
-    assert np.allclose(sorted(np.hypot(*(outline[:-1] - (1.0, 2.0)).T)), [1.0, 1.0, 2.0, 3.0])
-    assert len(other) == 5
-    assert outlines(replace(floor, far_m=(0.0,) * 5)) == []
+def test_the_map_of_the_floor_is_drawn_where_it_is() -> None:
+    floor = FreeFloor("camera", "hallway", 1.0, 2.0, (-0.2, 0.0, 0.2), (1.0, 1.0, 1.0), (2.0, 2.0, 2.0),
+                      ("thing", "thing", "thing"), (0.1,) * 3, (), 0.0)
+    (x_m, y_m), cells = FloorMap([floor], np.zeros((0, 3))).draw()
+
+    def tell(x: float, y: float) -> int:
+        return int(cells[len(cells) - 1 - math.floor((y - y_m) / CELL_M), math.floor((x - x_m) / CELL_M)])
+
+    assert tell(2.5, 2.02) == tell(2.3, 1.9) == 5 and tell(3.1, 2.02) == 95 and tell(2.1, 2.3) == 255
+    assert set(FloorMap([], np.zeros((0, 3))).draw()[1].ravel()) == {255}

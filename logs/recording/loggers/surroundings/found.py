@@ -1,4 +1,4 @@
-"""What the robot has found around it: contacts and echoes, free floor, things in the way, doors open or shut."""
+"""What the robot has found: contacts and echoes, the map of the floor, things in the way, doors open or shut."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from knowledge_sources.methods.floor import CELL_M, FloorMap
 from logs.recording.logger import Logger, Moment, Subject
 from logs.recording.loggers.surroundings.model_building import Strip, across, strip
-from logs.recording.palette import BELIEVED, EXPECTED, FREE, MATCHED, REJECTED, Colour, faint
+from logs.recording.palette import BELIEVED, EXPECTED, MATCHED, REJECTED, Colour, faint
 from logs.recording.paths import CONTACTS, DOORS, OBSTACLES, RANGES, SEEN_FLOOR
 from logs.recording.stream import RecordingStream
 from world_models import words
 from world_models.entries import Contact, DoorCondition, DoorState, Footprint, FreeFloor, Obstacle, Ranges
 
-Points = NDArray[np.float64]
 BUMPER_M, EAR_M = 0.3, 0.6
 """Of a bumper and of range sensors above the floor."""
-ABOVE_FLOOR_M, OUTLINE_M, OPACITY = 0.03, 0.02, 110
+ABOVE_FLOOR_M, OPACITY = 0.03, 0.5
 LINE_M = 0.02
 UNKNOWN_HEIGHT_M = 0.05
 """What nothing tells the height of is drawn so flat."""
@@ -58,31 +57,22 @@ class Felt(Logger):
             stream.log(RANGES, rr.LineStrips3D, strips=np.array(strips, np.float32).reshape(-1, 2, 3))
 
 
-class FloorSeenFree(Logger):
-    """Logs the free floor of each picture and of each reading of range sensors, in place of the last one."""
+class MapOfFloor(Logger):
+    """Logs how probably something stands on each cell of the floor, by the sights of it that are on the board."""
 
     def log(self, stream: RecordingStream, moment: Moment) -> None:
-        for entry in moment.changed(FreeFloor):
-            floor, path = entry.value, f"{SEEN_FLOOR}/{entry.value.sense}"
-            if self.is_new(path, "begun"):  # most robots have no range sensors
-                stream.fix(path, rr.LineStrips3D.from_fields(colors=[faint(FREE, OPACITY)], radii=OUTLINE_M))
-            height_m = self.subject.world.floor_m(floor.locale) + ABOVE_FLOOR_M
-            stream.log(path, rr.LineStrips3D, strips=[strip(outline, height_m) for outline in outlines(floor)])
-
-
-def outlines(floor: FreeFloor) -> list[Points]:
-    """(k, 2) closed outlines of the free floor [m, world], one for each row of directions that have any."""
-    bearings = np.array(floor.bearings_rad, float)
-    near, far = np.array(floor.near_m, float), np.array(floor.far_m, float)
-    is_free = far > near
-    runs = np.split(np.arange(len(is_free)), np.flatnonzero(np.diff(is_free)) + 1) if len(is_free) else []
-    return [_outline(floor, bearings[run], near[run], far[run]) for run in runs if is_free[run[0]] and len(run) > 1]
-
-
-def _outline(floor: FreeFloor, bearings: Points, near: Points, far: Points) -> Points:
-    ring = np.concatenate([np.column_stack([bearings, near])[::-1], np.column_stack([bearings, far])])
-    points = np.column_stack([np.cos(ring[:, 0]), np.sin(ring[:, 0])]) * ring[:, 1:] + (floor.x_m, floor.y_m)
-    return np.concatenate([points, points[:1]])
+        if not (seen := moment.changed(FreeFloor)):
+            return
+        floor_m = self.subject.world.floor_m(seen[-1].value.locale)
+        sights = [entry.value for entry in moment.mirror.all(FreeFloor)]
+        (x_m, y_m), cells = FloorMap([one for one in sights if self.subject.world.floor_m(one.locale) == floor_m],
+                                     np.zeros((0, 3))).draw()
+        if self.is_new(SEEN_FLOOR, "begun"):
+            stream.fix(SEEN_FLOOR, rr.GridMap.from_fields(cell_size=CELL_M, colormap="RvizMap", opacity=OPACITY))
+        rows, columns = cells.shape
+        stream.log(SEEN_FLOOR, rr.GridMap, data=[cells.tobytes()], format=[rr.components.ImageFormat(
+            width=columns, height=rows, color_model="L", channel_datatype="U8")],
+            translation=[(x_m, y_m, floor_m + ABOVE_FLOOR_M)])
 
 
 class ObstacleEdges(Logger):
@@ -141,4 +131,4 @@ class DoorStates(Logger):
         return strip(across(self._doors[state.door]), height_m)
 
 
-LOGGERS = (Felt, FloorSeenFree, ObstacleEdges, DoorStates)
+LOGGERS = (Felt, MapOfFloor, ObstacleEdges, DoorStates)
