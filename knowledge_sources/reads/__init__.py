@@ -26,7 +26,7 @@ from knowledge_sources.reads.followed_landmarks import (
 from knowledge_sources.reads.lost import (
     WHILE_LOST, declare_lost, find_panorama, is_dark, list_contacts, list_views, locate_contact,
 )
-from knowledge_sources.reads.motion_between import add_reports, bound_wheels_m, find_motion_between, follow_reports
+from knowledge_sources.reads.motion_between import add_reports, bound_wheels_m, find_motion_between
 from knowledge_sources.reads.questions import (
     ACTIVE_SKETCH, EMERGENCY_STOPS, OPEN_FAULT, active_goal, current_leg, deepest_sketch, find_belief, find_building,
     find_building_as_filed, find_camera, find_contact, find_difference, find_followed, find_frames, find_robot,
@@ -51,7 +51,7 @@ __all__ = [
     "find_first_level", "find_followed", "find_frames", "find_missing_floors", "find_motion_between",
     "find_near_frames", "find_obstacles", "find_p_not_alias", "find_p_there", "find_panorama", "find_planner",
     "find_robot", "find_robot_in", "find_search_here", "find_stop", "find_swept_next", "find_tried",
-    "find_way_to_goal", "follow_reports", "has_missed", "has_only_turned", "is_dark", "is_in_doubt", "is_just_found",
+    "find_way_to_goal", "has_missed", "has_only_turned", "is_dark", "is_in_doubt", "is_just_found",
     "is_over", "is_standing", "is_up_to_date", "is_worth_telling", "last_motion", "list_contacts",
     "list_doors_in_view", "list_filed_doors", "list_locales", "list_log_odds", "list_views", "locate_contact",
     "name_model", "name_obstacles", "open_discrepancies", "open_discrepancy", "open_impasse", "open_milestone",

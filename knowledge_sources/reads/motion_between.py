@@ -9,24 +9,39 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from statistics import NormalDist
 
 import numpy as np
 
 from blackboard import Entry, View
 from knowledge_sources.methods.arrays import Floats
+from knowledge_sources.methods.features import compute_mean_and_deviation, is_dark, measure_moved, read_picture
 from knowledge_sources.methods.floor import TYPICAL_M, MotionBetween
 from knowledge_sources.reads.conditions import Belief
+from knowledge_sources.reads.questions import rolling_course
 from world_models.actuator import ActuatorModel
-from world_models.entries import RISK, BodyFault, Difference, Drift, FloorView, MotionReport, MotorCommand
+from world_models.entries import (
+    RISK,
+    BodyFault,
+    CameraPicture,
+    Difference,
+    Drift,
+    FloorView,
+    MotionReport,
+    MotorCommand,
+)
 from world_models.frames import Pose2, wrap_angle
 
 MOTION = "motion"
 """What differs where pictures and wheels do not agree on the way."""
 WHEELS_PART = 0.25
 """Wheels that are wrong go by such a part more or less than they count, one standard deviation."""
-LAGS_S = tuple(0.1 * tenth for tenth in range(1, 11))
-"""So long before the wheels' report pictures may have been taken, each as likely [s]: less does no harm."""
+SHARED_SIGMA_RAD = 0.0014
+"""What a model, a camera and a matcher share of the heading (as ``SHARED_SIGMA_M`` of the place)."""
+MIN_MOVED, MAX_STOOD_S = 0.04, 1.0
+"""Part of the edges, in both halves of a picture, that move as the robot goes by a centimetre; and so long after the
+wheels have stopped pictures tell whether they are late."""
 MAX_APART_SIGMAS = 3.0
 """Wheels that say otherwise than what is believed by more than this slipped, or the robot was pushed."""
 
@@ -38,9 +53,9 @@ def find_motion_between(
     belief.
     """
     believed = _compare_beliefs(then, now)
-    reports = _list_reports(view, then.motion, now.value.motion)
+    reports = list_reports(view, then.motion, now.value.motion)
     drift = view.latest(Drift)
-    if drift is None or not reports or any(_is_broken(view, report) for report in reports):
+    if drift is None or not reports or any(is_broken(view, report) for report in reports):
         return believed, ()
     rolled = add_reports(now.robot.actuator, drift.value, [report.value for report in reports])
     off = believed.moved.position - rolled.moved.position
@@ -61,6 +76,18 @@ def add_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionRepor
         math.fsum(abs(report.turn_rad) for report in reports), math.fsum(report.move_m for report in reports))))
 
 
+def has_moved_standing(view: View) -> bool | None:
+    """Whether all moves between the last two pictures, though the wheels stood; None where it is not known."""
+    pictures, report = [entry.value for entry in islice(view.newest_first(CameraPicture), 2)], view.latest(MotionReport)
+    if len(pictures) < 2 or report is None or rolling_course(view) is not None:
+        return None
+    last_s, first_s = (picture.sim_time_s - report.value.sim_time_s for picture in pictures)
+    if not 0.0 <= first_s < last_s <= MAX_STOOD_S:
+        return None
+    now, before = (read_picture(picture.jpeg).half[..., 1] for picture in pictures)
+    return None if is_dark(*compute_mean_and_deviation(now)) else measure_moved(before, now) >= MIN_MOVED
+
+
 def bound_wheels_m(view: View, actuator: ActuatorModel, way_m: float) -> tuple[float, tuple[Entry[Difference], ...]]:
     """How much further off a belief may be after a way, at its risk, where the wheels are only suspected to go another
     part of it, and what says so; not where they are known to go so.
@@ -72,26 +99,6 @@ def bound_wheels_m(view: View, actuator: ActuatorModel, way_m: float) -> tuple[f
     if abs(wheels.off - actuator.reach) <= MAX_APART_SIGMAS * math.hypot(wheels.sigma, actuator.reach_sigma):
         return 0.0, ()
     return WHEELS_PART * abs(way_m) * NormalDist().inv_cdf(1.0 - 0.5 * RISK / wheels.p), (known,)
-
-
-def follow_reports(actuator: ActuatorModel, drift: Drift, reports: list[MotionReport], until_s: float) -> Pose2:
-    """Where the robot was at a time by what the wheels report, the oldest part first, in its frame before all of it."""
-    moved = Pose2(0.0, 0.0, 0.0)
-    for report in reports:
-        began_s = report.sim_time_s - report.duration_s
-        part = min(1.0, max(0.0, (until_s - began_s) / report.duration_s)) if report.duration_s else 1.0
-        turned = report.turn_rad if report.move_m and part else part * report.turn_rad  # it turns first, then moves
-        moved = moved @ actuator.predict_motion(turned, part * report.move_m, drift.curvature_per_m)
-    return moved
-
-
-def list_lagging(view: View, actuator: ActuatorModel, drift: Drift, since: int) -> tuple[Pose2, ...]:
-    """How the robot moved by so many of the last reports, had it each time been seen so much before, for each lag."""
-    reports = sorted((entry.value for entry in view.all(MotionReport)), key=lambda report: report.sim_time_s)
-    began_s = reports[-since].sim_time_s - reports[-since].duration_s
-    seen = ([follow_reports(actuator, drift, reports, at_s - lag) for at_s in (began_s, reports[-1].sim_time_s)]
-            for lag in LAGS_S)
-    return tuple(a.inverse() @ b for a, b in seen)
 
 
 def list_asked(view: View, reports: Sequence[Entry[MotionReport]]) -> list[MotionReport]:
@@ -120,7 +127,7 @@ def _spread(covariance: Floats) -> tuple[float, float]:
     return math.sqrt(max(float(np.trace(covariance[:2, :2])) / 2.0, 0.0)), math.sqrt(max(float(covariance[2, 2]), 0.0))
 
 
-def _list_reports(view: View, since: str, until: str) -> list[Entry[MotionReport]]:
+def list_reports(view: View, since: str, until: str) -> list[Entry[MotionReport]]:
     """The reports after one up to another, the oldest first; none where not all of them are on the board any more."""
     between: list[Entry[MotionReport]] = []
     for report in view.newest_first(MotionReport):
@@ -131,7 +138,7 @@ def _list_reports(view: View, since: str, until: str) -> list[Entry[MotionReport
     return []
 
 
-def _is_broken(view: View, report: Entry[MotionReport]) -> bool:
+def is_broken(view: View, report: Entry[MotionReport]) -> bool:
     """Whether the motion was broken off: the wheels do not tell all of it."""
     asked = report.because[0].id
     return view.latest(BodyFault, lambda fault: fault.request == asked) is not None

@@ -7,14 +7,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from blackboard import Change, Effect, Level, Post, Posted, View, Watch
+from blackboard import Change, Effect, Level, Post, Posted, View, Watch, rule
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.belief import hedge
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, add_reports, is_worth_telling
-from knowledge_sources.reads.motion_between import LAGS_S, MOTION, WHEELS_PART, list_asked, list_lagging
+from knowledge_sources.reads.motion_between import MOTION, SHARED_SIGMA_RAD, WHEELS_PART, has_moved_standing, list_asked
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.actuator import ActuatorModel
 from world_models.entries import (
     LAST_REPORTS,
@@ -29,8 +28,6 @@ from world_models.entries import (
 )
 from world_models.frames import Pose2
 
-SHARED_SIGMA_RAD = 0.0014
-"""What a model, a camera and a matcher share of the heading (as ``SHARED_SIGMA_M`` of the place)."""
 BEND_RAD_PER_M, ASIDE_M_PER_RAD = 0.1, 0.05
 """Wheels that turn wrongly bend so much, and slip so far aside, one standard deviation."""
 MIN_REACH_M = 0.2
@@ -39,48 +36,43 @@ ELSEWHERE = 1.0, 1.0, 1.0
 """How far off a robot is that was pushed or carried, or takes one place for another [m, m, rad]."""
 
 
+P_MOVED, P_STOOD = 0.001, 0.3
+"""Part of the pairs of pictures, while the wheels stand, in which all moves by chance, as by a push just then; and in
+which nothing moves though they are late: it had stood for long enough."""
+
+
 def tells_place(certificate: Certificate) -> bool:
     """Whether a picture tells a place, be it held back as a sense may lie: else nothing could acquit that sense."""
     return certificate.verdict != "refuted" and certificate.p_false <= MAX_P_RIVAL
 
 
-class CorrectionMonitor(RobotKnowledgeSource):
-    """Says where the motion from one picture to the next is not the one that the wheels counted.
+def find_otherwise(view: View, trigger: Change) -> Post | None:
+    """What is not as expected of the way since the certificate before; None where all is, or not all is known.
 
-    A picture that never changes says that the robot stands. Wheels may go another part of the way than they count, or
-    turn otherwise: that is told apart, as a turn says nothing of the first, nor a straight way of the second. If
-    they went as they were asked, and counted something else, the count is wrong.
-    A late picture shows where the robot was a while before, which is the same place only where it stood for so long.
+    A picture that never changes says that the robot stands, and one that changes while the wheels stand is late. Wheels
+    may go another part of the way than they count, or turn otherwise than is stated: that is told apart, as a turn says
+    nothing of the first, nor a straight way of the second. If they went as they were asked, and counted something else,
+    the count is wrong.
     """
-
-    level, priority = Level.PLAN, Priority.ENTER
-    on = (Watch(Certificate, (Posted,), tells_place),)
-    needs = (HELD,)
-    writes = (Evidence,)
-
-    def bind(self, view: View, trigger: Change) -> Post | None:
-        """What is not as expected of the way since the certificate before; None where all is, or not all is known."""
-        before = view.latest(Certificate, lambda c: c is not trigger.entry.value)
-        if before is None or not tells_place(before.value):
-            return None
-        began, ended = view.get(before.value.fix), view.get(trigger.entry.value.fix)
-        reports = view.since(MotionReport, before.cycle)
-        if began is None or ended is None or not 0 < len(reports) < LAST_REPORTS:
-            return None
-        seen, here = began.value.world_from_robot.inverse() @ ended.value.world_from_robot, ended.value.world_from_robot
-        actuator, drift = HELD.of(view).robot.actuator, view.latest(Drift)
-        known = Drift.unknown(actuator, here.heading_rad) if drift is None else drift.value
-        explained = _explain(seen, _spread(began.value, ended.value), actuator, known, [one.value for one in reports],
-                             list_asked(view, reports), list_lagging(view, actuator, known, len(reports)))
-        if not is_worth_telling(view, MOTION, explained):
-            return None
-        shows = f"by pictures it moved {seen.x_m:+.2f} m ahead and {math.degrees(seen.heading_rad):+.0f} degrees"
-        told = Evidence(MOTION, shows, explained, here.x_m, here.y_m, here.heading_rad, 0.0, 0.0,
-                        reports[-1].value.sim_time_s)
-        return Post(told, (trigger.entry, began, ended, *reports))
-
-    def act(self, view: View, case: Post) -> Iterable[Effect]:
-        yield case
+    before = view.latest(Certificate, lambda c: c is not trigger.entry.value)
+    if before is None or not tells_place(before.value):
+        return None
+    began, ended = view.get(before.value.fix), view.get(trigger.entry.value.fix)
+    reports = view.since(MotionReport, before.cycle)
+    if began is None or ended is None or not 0 < len(reports) < LAST_REPORTS:
+        return None
+    seen, here = began.value.world_from_robot.inverse() @ ended.value.world_from_robot, ended.value.world_from_robot
+    actuator, drift, is_late = HELD.of(view).robot.actuator, view.latest(Drift), has_moved_standing(view)
+    known = Drift.unknown(actuator, here.heading_rad) if drift is None else drift.value
+    explained = _explain(seen, _spread(began.value, ended.value), actuator, known, [one.value for one in reports],
+                         list_asked(view, reports), is_late)
+    if not is_worth_telling(view, MOTION, explained):
+        return None
+    shows = "all moves in pictures while the wheels stand" if is_late else (
+        f"by pictures it moved {seen.x_m:+.2f} m ahead and {math.degrees(seen.heading_rad):+.0f} degrees")
+    told = Evidence(MOTION, shows, explained, here.x_m, here.y_m, here.heading_rad, 0.0, 0.0,
+                    reports[-1].value.sim_time_s)
+    return Post(told, (trigger.entry, began, ended, *reports))
 
 
 def _spread(began: PoseFix, ended: PoseFix) -> Floats:
@@ -95,7 +87,7 @@ def _spread(began: PoseFix, ended: PoseFix) -> Floats:
 
 def _explain(
     seen: Pose2, spread: Floats, actuator: ActuatorModel, drift: Drift, reports: list[MotionReport],
-    asked: list[MotionReport], lagging: tuple[Pose2, ...],
+    asked: list[MotionReport], is_late: bool | None,
 ) -> tuple[Explanation, ...]:
     """What each rival makes of a motion by pictures, with its covariance, of what the wheels report of it, and of what
     was asked of them.
@@ -103,6 +95,9 @@ def _explain(
     rolled = add_reports(actuator, drift, reports)
     moved, off = rolled.moved, seen.minus(rolled.moved)
     usual = spread + np.diag(np.square([rolled.sigma_m, rolled.sigma_m, rolled.sigma_rad]))
+    stated = add_reports(actuator, Drift.unknown(actuator, 0.0), reports)  # how they turn was learnt, be it wrong
+    as_stated = spread + np.diag(np.square([stated.sigma_m, stated.sigma_m, stated.sigma_rad]))
+    bend = seen.minus(stated.moved)
     gone_m, turned_rad = (math.fsum(abs(part) for part in parts) for parts in (
         (one.move_m for one in reports), (one.turn_rad for one in reports)))
     aside_m = ASIDE_M_PER_RAD * turned_rad + BEND_RAD_PER_M * gone_m**2 / 2.0
@@ -110,18 +105,18 @@ def _explain(
     bent = np.diag(np.square([aside_m, aside_m, WHEELS_PART * turned_rad + BEND_RAD_PER_M * gone_m]))
     plain = _log_density(off, usual)
     told = add_reports(actuator, drift, asked).moved
-    late = [_log_density(seen.minus(moved), usual) - plain for moved in lagging]
     ratios: dict[RivalKind, float] = {
         "wheels": _log_density(off, usual + WHEELS_PART**2 * np.outer(along, along)) - plain,
-        "turns": _log_density(off, usual + bent) - plain,
+        "turns": _log_density(bend, as_stated + bent) - _log_density(bend, as_stated),
         "still camera": _log_density(seen.minus(Pose2(0.0, 0.0, 0.0)), spread) - plain,
-        "late pictures": float(np.logaddexp.reduce(late)) - math.log(len(late)),
         "odometry": _log_density(seen.minus(told), usual) - plain,
         "elsewhere": _log_density(off, usual + np.diag(np.square(ELSEWHERE))) - plain}
+    if is_late is not None:  # pictures that are late tell nothing else of the way
+        ratios = {"late pictures": -math.log(P_MOVED)} if is_late else ratios | {"late pictures": math.log(P_STOOD)}
     reach, sigma = _measure_reach(seen, moved, usual, actuator.reach)
     what = {"wheels": f"wheels that go {reach:.2f} m a metre" if sigma else "wheels that go another part of the way",
-            "turns": f"wheels that turned by {math.degrees(off[2]):+.1f} degrees more than they count",
-            "late pictures": f"pictures that are {LAGS_S[int(np.argmax(late))]:.1f} s late",
+            "turns": f"wheels that turned by {math.degrees(bend[2]):+.1f} degrees more than they count",
+            "late pictures": "pictures that show where the robot was before",
             "still camera": "a camera whose picture does not change",
             "odometry": f"wheels that counted {moved.x_m - told.x_m:+.2f} m more than they went",
             "elsewhere": "a robot that was moved, or is elsewhere"}
@@ -143,3 +138,10 @@ def _measure_reach(seen: Pose2, moved: Pose2, spread: Floats, reach: float) -> t
 def _log_density(off: Floats, covariance: Floats) -> float:
     """Of a Gaussian (3,) about zero, but for what all have in common."""
     return -0.5 * float(off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1])
+
+
+@rule(on=Watch(Certificate, (Posted,), tells_place), writes=Evidence, needs=(HELD,), bind=find_otherwise,
+      priority=Priority.ENTER, level=Level.PLAN)
+def correction_monitor(_view: View, case: Post) -> Iterable[Effect]:
+    """Says where the motion from one picture to the next is not the one that the wheels counted."""
+    yield case

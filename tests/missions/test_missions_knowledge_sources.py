@@ -41,7 +41,7 @@ NOT_NEEDED = {
     "detour_finder", "lookout_planner", "belief_checker", "view_updater", "probe_photographer", "panorama_builder",
     "localizer", "prober", "pose_adopter", "goal_renewer", "landmark_chooser",
     "floor_changer", "travel_breaker", "refiner", "rival_weigher", "lens_monitor", "correction_monitor", "sense_judge",
-    "wheels_calibrator", "surveyor", "bumper_monitor", "exposure_monitor"}
+    "wheels_calibrator", "surveyor", "bumper_monitor", "exposure_monitor", "push_monitor"}
 """Where nothing goes wrong, the mission may be reached without these: they close servo loops, answer faults, steer on
 the move, ride in elevators, find what is before the camera or in the way, take up what somebody tells, learn of the
 camera, doubt a sense, or refine what passes through more than one room."""

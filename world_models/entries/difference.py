@@ -16,7 +16,7 @@ LAST_EVIDENCE = 64
 RivalKind = Literal[
     "chance", "thing", "jamb", "leaf", "wall", "dirt", "still camera", "late pictures", "lens", "focal length",
     "mounting", "wheels", "turns", "odometry", "bumper", "lamp", "cover", "exposure",
-    "elsewhere", "mover",
+    "elsewhere", "pushed", "mover",
 ]
 SENSES: frozenset[RivalKind] = frozenset({
     "dirt", "still camera", "late pictures", "lens", "focal length", "mounting", "wheels", "turns", "odometry",
@@ -34,7 +34,7 @@ TOLD_BY: Mapping[RivalKind, str] = {
     "mounting": "looks at near floor and far walls", "wheels": "another way between two sure places",
     "odometry": "motions of other lengths", "bumper": "a free motion", "lamp": "a picture in another room",
     "cover": "a picture in another room", "exposure": "a picture in another room",
-    "elsewhere": "what can be seen from here alone",
+    "elsewhere": "what can be seen from here alone", "pushed": "another look from here, and one from further on",
     "mover": "the same look a second later",
 }
 """What would tell a rival from the others."""

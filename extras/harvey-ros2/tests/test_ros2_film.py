@@ -22,7 +22,7 @@ from harvey_ros2.messages.messages import message_types
 from harvey_ros2.messages.run_messages import RunMessages, TimedMessage
 from harvey_ros2.recordings.bag_reader import Bag
 from harvey_ros2.recordings.film_reader import Film, is_film
-from knowledge_sources.senses.lens_monitor import LensMonitor
+from knowledge_sources.senses.lens_monitor import lens_monitor
 from sim.faults.built_in_faults import Kidnap
 from world_models.files.toml.camera_file import camera_text
 from world_models.files.toml.mission import ROOT, named_file
@@ -96,7 +96,7 @@ def test_a_source_that_raises_is_said_and_then_nothing_is_sure(
     few.mkdir()
     for picture in sorted(film[0].iterdir())[:4]:
         (few / picture.name).write_bytes(picture.read_bytes())
-    monkeypatch.setattr(LensMonitor, "bind", break_down)
+    monkeypatch.setattr(type(lens_monitor), "bind", break_down)
     assert main(["follow", str(few), "--rate", str(HZ), "--world", "research_center", "--calibration", str(film[1]),
                  "--start", START, "--out", str(tmp_path / "run")]) == 1
     assert re.search(r"does not know where it is: .* raised ValueError: broken \(\d+ times\)", capsys.readouterr().out)

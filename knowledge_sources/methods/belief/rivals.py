@@ -30,7 +30,7 @@ PRIORS: Mapping[RivalKind, float] = {
     "chance": 3.0, "thing": 0.0, "leaf": -1.0, "jamb": 0.0, "wall": 0.0, "dirt": -1.0,
     "still camera": -4.0, "late pictures": -4.5, "lens": -4.0, "focal length": -2.0,
     "mounting": -2.0, "wheels": -2.0, "turns": -2.0, "odometry": -4.0, "bumper": -4.0,
-    "lamp": -2.0, "cover": -3.0, "exposure": -3.0, "elsewhere": -3.0, "mover": -1.0,
+    "lamp": -2.0, "cover": -3.0, "exposure": -3.0, "elsewhere": -3.0, "pushed": -1.0, "mover": -1.0,
 }
 """Log odds of a rival before any evidence, against what nobody has thought of: what is ordinary first."""
 CHANCE_BESIDE = -2.0

@@ -23,6 +23,7 @@ from world_models.camera import Camera
 
 MIN_CONTRAST = 6.0  # a dark frame has less contrast (standard deviation of its grey values, 0 to 255) than this
 MIN_BRIGHTNESS = 40.0  # a dark frame also has a lower mean than this; a brighter one shows a bare wall
+MIN_SLOPE = 8.0  # an edge of a picture that is compared has so many grey levels a pixel
 NOISE_ROWS = 64  # rows of an image, about, on which its pixel noise is estimated
 
 ROUNDING_SIGMA = 12.0**-0.5
@@ -186,6 +187,16 @@ def _compute_noise_response(image: Any, step: int) -> float:
             response[at] = abs(a - 2.0 * b + d)
             at += 1
     return float(np.median(response))
+
+
+def measure_moved(before: Image, now: Image) -> float:
+    """The part of the edges of a picture (h, w) that another does not show there, in that half of it where it is less:
+    what moves before a camera that stands is hardly everywhere.
+    """
+    then, here = (right + 1j * down for down, right in (np.gradient(image.astype(float)) for image in (before, now)))
+    strong, gone = np.abs(then) > MIN_SLOPE, (np.conj(then) * here).real < 0.5 * np.abs(then) ** 2
+    halves = zip(np.array_split(strong, 2, axis=1), np.array_split(gone, 2, axis=1), strict=True)
+    return min(float(moved[edges].mean()) if edges.any() else 0.0 for edges, moved in halves)
 
 
 def _locked(image: Image) -> Image:

@@ -20,11 +20,11 @@ from knowledge_sources.methods.calibration import (
     MAX_COUNTED,
     compute_camera_covariance,
 )
-from knowledge_sources.senses.camera_calibrator import CameraCalibrator
+from knowledge_sources.senses.camera_calibrator import camera_calibrator
 from world_models.entries import CameraState, Certificate, MilestoneVerdict, PoseFix, Travel, begin_travel, diagonal
 from world_models.frames import Pose2
 
-SOURCE = CameraCalibrator()
+SOURCE = camera_calibrator
 FLOORS = (*(LEAST_SIGMA_RAD,) * 3, LEAST_SIGMA_M, LEAST_SIGMA_FOCAL, LEAST_SIGMA_CENTRE_PX, LEAST_SIGMA_CENTRE_PX)
 YAW = 2
 HERE = Pose2(3.0, 1.5, 0.4)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from itertools import islice
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ import pytest
 from blackboard import Effect, Level, Post, Revise
 from generated_boards import Bench, effect_on, made, reasons, to_world
 from harvey.testing import check_source, plain_robot
-from knowledge_sources.action.landmark_chooser import LandmarkChooser
+from knowledge_sources.action.landmark_chooser import landmark_chooser
 from knowledge_sources.methods.features import read_picture
 from knowledge_sources.methods.tracking import edge_alignment, select_landmarks
 from lab_pictures import ROOM, draw_places, photograph, robot, stage
@@ -41,15 +40,9 @@ def setting() -> tuple[Pose2, bytes]:
     raise AssertionError("expected a place with enough landmarks")
 
 
-class Chosen(NamedTuple):
+def choose(*, off_rad: float = 0.0, has_old: bool = True, lost: Level | None = None,
+           seen_in: str = "CameraPicture-1") -> tuple[Bench, tuple[Effect, ...] | None]:
     """A board after a milestone, and what the chooser makes of it."""
-
-    bench: Bench
-    effects: tuple[Effect, ...] | None
-
-
-def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = True, lost: Level | None = None,
-           seen_in: str = "CameraPicture-1") -> Chosen:
     pose, jpeg = setting()
     bench = Bench(robot())
     if has_old:
@@ -65,13 +58,13 @@ def choose(source: LandmarkChooser, *, off_rad: float = 0.0, has_old: bool = Tru
     belief = bench.apply(Revise(belief, replace(belief.value, basis="milestone"), (lines, belief)))[0].entry
     if lost is not None:
         bench.doubt(lost)
-    return Chosen(bench, bench.ask(source, belief))
+    return bench, bench.ask(landmark_chooser, belief)
 
 
 @pytest.mark.parametrize("has_old", [False, True])
 @pytest.mark.usefixtures("no_edges")
 def test_all_landmarks_are_of_the_newest_picture(has_old: bool) -> None:
-    effects = choose(LandmarkChooser(), has_old=has_old).effects
+    effects = choose(has_old=has_old)[1]
     effect = effect_on(effects, Tracks)
     tracks, (pose, jpeg) = effect.value, setting()
     expected = select_landmarks(robot(), (), "CameraPicture-2", read_picture(jpeg).grey, pose)
@@ -89,9 +82,8 @@ def test_all_landmarks_are_of_the_newest_picture(has_old: bool) -> None:
 @pytest.mark.parametrize("has_old", [False, True])
 @pytest.mark.usefixtures("no_edges")
 def test_a_new_stretch_of_the_drift_starts_at_the_believed_heading(has_old: bool) -> None:
-    effects = choose(LandmarkChooser(), has_old=has_old).effects
-    drifts = made(effects, Drift)
-    assert drifts == [Drift(0.003, 0.004, pytest.approx(setting()[0].heading_rad))] * has_old
+    effects = choose(has_old=has_old)[1]
+    assert made(effects, Drift) == [Drift(0.003, 0.004, pytest.approx(setting()[0].heading_rad))] * has_old
     if has_old:
         assert reasons(effect_on(effects, Drift)) == {"Tracks"}
 
@@ -103,17 +95,16 @@ def test_the_stretch_starts_at_the_heading_in_the_world_whatever_the_locale() ->
     belief = bench.believe(pose)
     bench.put(CameraPicture(compress_jpeg(np.full((256, 256), 128, np.uint8), 90), 0, 0.0, "milestone"))
     bench.put(Drift(0.003, 0.004, 9.0))
-    effects = bench.ask(LandmarkChooser(), bench.revise(belief))
+    effects = bench.ask(landmark_chooser, bench.revise(belief))
     assert made(effects, Drift) == [Drift(0.003, 0.004, pytest.approx(to_world(pose).heading_rad))]
     assert made(effects, Tracks)[0].items == ()
 
 
 def test_the_belief_is_aligned_with_the_edges_before_landmarks_are_cut() -> None:
-    off_rad = 0.003
-    effects = choose(LandmarkChooser(), off_rad=off_rad).effects
+    effects = choose(off_rad=0.003)[1]
     effect = effect_on(effects, Hypothesis)
     heading = effect.value.world_from_robot(stage().world).heading_rad
-    assert abs(heading - setting()[0].heading_rad) < 0.5 * off_rad
+    assert abs(heading - setting()[0].heading_rad) < 0.5 * 0.003
     assert (effect.value.basis, effect.value.motion, effect.value.locale) == ("tracks", "m", ROOM)
     assert reasons(effect) == {"CameraPicture-2", "Hypothesis-1", "Tracks"}
     assert made(effects, Drift)[0].heading_rad == pytest.approx(heading)
@@ -122,9 +113,8 @@ def test_the_belief_is_aligned_with_the_edges_before_landmarks_are_cut() -> None
 def test_the_same_picture_twice_is_once() -> None:
     """By the picture of its milestone the belief gets neither another pose nor surer; by a newer one it does."""
     for picture, times in (("CameraPicture-1", 1), ("CameraPicture-2", 0)):
-        assert len(made(choose(LandmarkChooser(), off_rad=0.003, seen_in=picture).effects, Hypothesis)) == times
+        assert len(made(choose(off_rad=0.003, seen_in=picture)[1], Hypothesis)) == times
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:
-    bench = choose(LandmarkChooser()).bench
-    check_source(LandmarkChooser, bench, bench.view["Hypothesis-1"])
+    check_source(landmark_chooser, bench := choose()[0], bench.view["Hypothesis-1"])

@@ -16,11 +16,11 @@ from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.milestone.med_r_and_t import MedRAndT
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
-from knowledge_sources.senses.lens_monitor import LensMonitor
+from knowledge_sources.senses.lens_monitor import lens_monitor
 from world_models.entries import Evidence, LineMatch, Milestone, PoseFix, diagonal
 from world_models.frames import Pose2
 
-SOURCE, ROBOT, HERE = LensMonitor(), plain_robot(), Pose2(2.0, 1.6, 0.15)
+SOURCE, ROBOT, HERE = lens_monitor, plain_robot(), Pose2(2.0, 1.6, 0.15)
 THERE = Pose2(1.0, 2.0, 0.0), Pose2(0.5, 3.2, -0.4)
 
 

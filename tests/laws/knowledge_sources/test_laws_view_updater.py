@@ -10,12 +10,12 @@ from blackboard import Entry
 from generated_boards import Bench, effect_on, reasons, to_world
 from harvey.testing import check_source, plain_robot
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from knowledge_sources.milestone_selector.view_updater import ViewUpdater
+from knowledge_sources.milestone_selector.view_updater import view_updater
 from world_models.entries import Milestone, Obstruction
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
-SOURCE = ViewUpdater()
+SOURCE = view_updater
 AHEAD = to_world(Pose2(0.0, 0.0, 0.0)).heading_rad
 
 

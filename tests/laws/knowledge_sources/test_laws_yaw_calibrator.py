@@ -136,14 +136,6 @@ def test_the_camera_stays_where_it_was_and_looks_where_it_looked(off: float, len
     assert effect.value.covariance == pytest.approx(np.array(way.belief.value.covariance))
 
 
-@settings(max_examples=40)
-@given(st.floats(-0.04, 0.04), st.floats(1.5, 9.0))
-def test_come_as_far_to_the_right_as_to_the_left_it_learns_the_opposite(off: float, length_m: float) -> None:
-    one, other = come(off, length_m, course_rad=0.7).camera, come(-off, length_m, course_rad=-0.7).camera
-    assert one is not None and other is not None
-    assert one.mount.yaw_rad == pytest.approx(-other.mount.yaw_rad, abs=1e-12)
-
-
 @settings(max_examples=30)
 @given(st.floats(-0.03, 0.03), st.floats(1.5, 9.0), st.floats(1.0, 4.0))
 def test_the_way_goes_on_by_the_turned_headings_until_it_is_spent(off: float, length_m: float, bent: float) -> None:
@@ -190,16 +182,6 @@ def test_it_learns_where_the_variance_shrinks_enough(more: float) -> None:
     assert (come(0.01, learnt=known).camera is not None) == (more > 0.0)
 
 
-@pytest.mark.parametrize("more", [-SMALL, SMALL])
-def test_a_way_that_is_too_long_is_measured_for_the_last_time(more: float) -> None:
-    way = come(0.0, MAX_TRAVEL_M + more)
-    (travel,) = made(way.effects, Travel)
-    assert way.camera is not None and (travel.gone_m == 0.0) == (more > 0.0)
-    if more > 0.0:
-        assert travel.yaw_rad == pytest.approx(way.camera.mount.yaw_rad)
-        assert travel.yaw_variance == pytest.approx(1 / (1 / PRIOR + 1 / compute_noise(MAX_TRAVEL_M, 0.0)), rel=1e-4)
-
-
 def test_only_what_is_open_aside_of_the_way_leaves_the_yaw_open() -> None:
     """The same places, known less well along the way, or across it."""
     variances = []
@@ -217,11 +199,13 @@ def test_only_what_is_open_aside_of_the_way_leaves_the_yaw_open() -> None:
         assert variance == pytest.approx(1 / (1 / PRIOR + 1 / noise), rel=1e-6)
 
 
-def test_a_way_that_begins_anew_begins_with_the_yaw_as_it_was_learnt() -> None:
+def test_a_way_that_is_too_long_is_measured_and_another_begins_with_the_yaw_as_it_was_learnt() -> None:
+    assert made(come(0.0, MAX_TRAVEL_M - SMALL).effects, Travel)[0].gone_m > 0.0
     way = come(0.01, MAX_TRAVEL_M + SMALL)
     (travel,) = made(way.effects, Travel)
     assert way.camera is not None and way.camera.mount.yaw_rad < -0.005
     assert travel.yaw_rad == pytest.approx(way.camera.mount.yaw_rad) and travel.gone_m == 0.0
+    assert travel.yaw_variance == pytest.approx(1 / (1 / PRIOR + 1 / compute_noise(MAX_TRAVEL_M, 0.0)), rel=1e-4)
     (turned,) = made(way.effects, Hypothesis)  # and where the robot is by the turned headings
     here = turned.world_from_robot(house())
     assert travel.began.distance_to(here) < 1e-9

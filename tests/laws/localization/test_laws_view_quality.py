@@ -25,7 +25,7 @@ from knowledge_sources.methods.verification.view_quality import (
     is_good_view,
 )
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from knowledge_sources.milestone_selector.view_updater import ViewUpdater
+from knowledge_sources.milestone_selector.view_updater import view_updater
 from towers import tower
 from world_models.entries import Milestone, Obstruction, Place, PlanSketch, Subgoal
 from world_models.files.toml.source import Source
@@ -112,5 +112,5 @@ def test_after_a_ride_nothing_is_expected_of_the_car_as_it_looks_the_same_on_eve
     expected = bench.apply(effect_on(bench.ask(ViewPredictor(), milestone), Milestone))[0].entry
     assert np.allclose(expected.value.expected, wanted)
     hidden = bench.put(Obstruction(((-30.0, 0.0), (-20.0, 0.0), (-20.0, 9.0), (-30.0, 9.0))))
-    again = effect_on(bench.ask(ViewUpdater(), hidden), Milestone).value
+    again = effect_on(bench.ask(view_updater, hidden), Milestone).value
     assert np.allclose(again.expected, wanted) and belief.value.is_held

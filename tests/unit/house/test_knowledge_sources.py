@@ -103,7 +103,7 @@ SHARED: dict[str, tuple[int, str]] = {
     "Discrepancy": (13, "who measures a difference posts it; who corrects it says so"),
     "DoorState": (3, "by a leaf in sight, by a touch, and by what a shut door explains"),
     "Drift": (4, "the belief's other half: who turns the heading restarts it"),
-    "Evidence": (10, "each who finds that something is not as expected; one weighs it"),
+    "Evidence": (11, "each who finds that something is not as expected; one weighs it"),
     "FreeFloor": (2, "two senses"),
     "Goal": (4, "set, reached, replaced because lost, replaced because asked"),
     "Hypothesis": (9, "each correction of the belief is one rule"),

@@ -36,9 +36,9 @@ from knowledge_sources.relocalizer.alias_monitor import AliasMonitor
 from knowledge_sources.relocalizer.localizer import Localizer
 from knowledge_sources.relocalizer.panorama_builder import PanoramaBuilder
 from knowledge_sources.relocalizer.pose_adopter import pose_adopter
-from knowledge_sources.senses.camera_calibrator import CameraCalibrator
-from knowledge_sources.senses.correction_monitor import CorrectionMonitor
-from knowledge_sources.senses.lens_monitor import LensMonitor
+from knowledge_sources.senses.camera_calibrator import camera_calibrator
+from knowledge_sources.senses.correction_monitor import correction_monitor
+from knowledge_sources.senses.lens_monitor import lens_monitor
 from knowledge_sources.senses.travel_breaker import travel_breaker
 from knowledge_sources.senses.yaw_calibrator import YawCalibrator
 from logs.run_directory import RunDirectory
@@ -52,8 +52,8 @@ from world_models.frames import Pose2
 from world_models.plugins import GUESTS_GROUP, list_plugins
 from world_models.robot import RobotModel
 
-SEATED = (interpreter, LineFinder, Matcher, MedRAndT, LensMonitor, CorrectionMonitor, rival_weigher, MilestoneJudge,
-          CameraCalibrator, AliasMonitor, plan_adjuster, YawCalibrator, travel_breaker, PanoramaBuilder, Localizer,
+SEATED = (interpreter, LineFinder, Matcher, MedRAndT, lens_monitor, correction_monitor, rival_weigher, MilestoneJudge,
+          camera_calibrator, AliasMonitor, plan_adjuster, YawCalibrator, travel_breaker, PanoramaBuilder, Localizer,
           pose_adopter)
 """The sources of a mission that are wanted here too."""
 GUESTS = ("claim_reckoner", "view_expecter", "loss_declarer", "place_confirmer")
