@@ -35,7 +35,7 @@ LINE_SIGMA_PX = 0.45
 LINE_SIGMA_FREEDOM = 10.0
 """Weight of that, in degrees of freedom."""
 STATED_FACTOR = 4.0
-"""Factor on a belief's covariance where something else is false: tails are longer than stated, but as it was put down."""
+"""Factor on a belief's covariance where something else is false: tails are longer than stated, but where put down."""
 LEAST = np.diag(np.square([1e-4, 1e-4, 1e-5]))
 """Covariance of a belief that is stated to have none: a tenth of a millimetre, a hundredth of a milliradian."""
 NOISE, BELIEF = "noise alone", "the belief before"
