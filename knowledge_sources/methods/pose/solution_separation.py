@@ -87,9 +87,8 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
     offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]
     known = (1.0 if rests.loosened is None else STATED_FACTOR) * rests.covariance + LEAST
-    place_m, turn_rad = rests.excess
     factor = count_sigmas(6 + len(set(rests.landmarks)) + len(rests.walls))
-    excess = np.diag(np.square([place_m, place_m, turn_rad])) / factor**2
+    excess = np.diag(np.square([rests.excess[0], *rests.excess])) / factor**2
     stated, loosened = (build_information(prior + excess, rests.camera_covariance)[np.ix_(FREE, FREE)]
                         for prior in (known, known if rests.loosened is None else rests.loosened))
     camera, everything = np.array(loosened), np.ones(len(distances), bool)
