@@ -35,7 +35,7 @@ LINE_SIGMA_PX = 0.45
 LINE_SIGMA_FREEDOM = 10.0
 """Weight of that, in degrees of freedom."""
 STATED_FACTOR = 4.0
-"""Factor on a belief's covariance where something else is taken as false: beliefs have longer tails than stated."""
+"""Factor on a belief's covariance where something else is false: tails are longer than stated, but where put down."""
 LEAST = np.diag(np.square([1e-4, 1e-4, 1e-5]))
 """Covariance of a belief that is stated to have none: a tenth of a millimetre, a hundredth of a milliradian."""
 NOISE, BELIEF = "noise alone", "the belief before"
@@ -56,6 +56,7 @@ class Rests(NamedTuple):
         excess: by how much the protection level of the belief is above that covariance [m, rad]: what is false now was
             so when it came to be believed.
         walls: by name, (n, 3) by how much each line moves with a wall along its normal, with all that is on it [m].
+        is_seen: whether a picture shows the lines so; else it is what one should show, and they scatter as expected.
     """
 
     lines_world: Floats
@@ -72,6 +73,7 @@ class Rests(NamedTuple):
     model_m: float = 0.0
     excess: tuple[float, float] = (0.0, 0.0)
     walls: Sequence[tuple[str, Floats]] = ()
+    is_seen: bool = True
 
 
 def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protection:
@@ -80,13 +82,13 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
         return _measure(NOISE, np.zeros(POSE), covariance, count_sigmas(1))
     distances, slopes = _measure_lines(pose, rests)
     said = LINE_SIGMA_FREEDOM * LINE_SIGMA_PX**2 + float(np.sum(distances**2))  # as expected, and as the lines scatter
-    variance = said / (LINE_SIGMA_FREEDOM + max(distances.size - POSE, 0))
+    variance = said / (LINE_SIGMA_FREEDOM + max(distances.size - POSE, 0) * rests.is_seen)
     hessians = np.einsum("nea,neb->nab", slopes, slopes) / variance
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
     offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]
-    known, (place_m, turn_rad) = STATED_FACTOR * rests.covariance + LEAST, rests.excess
+    known = (1.0 if rests.loosened is None else STATED_FACTOR) * rests.covariance + LEAST
     factor = count_sigmas(6 + len(set(rests.landmarks)) + len(rests.walls))
-    excess = np.diag(np.square([place_m, place_m, turn_rad])) / factor**2
+    excess = np.diag(np.square([rests.excess[0], *rests.excess])) / factor**2
     stated, loosened = (build_information(prior + excess, rests.camera_covariance)[np.ix_(FREE, FREE)]
                         for prior in (known, known if rests.loosened is None else rests.loosened))
     camera, everything = np.array(loosened), np.ones(len(distances), bool)
@@ -143,7 +145,8 @@ def _list_left_out(rests: Rests, pose: Pose2) -> Iterator[tuple[str, Mask, bool]
     """
     names, (x_m, y_m) = np.asarray(rests.landmarks), (rests.lines_world[..., :2].mean(axis=1) - pose.position).T
     is_left = math.cos(pose.heading_rad) * y_m - math.sin(pose.heading_rad) * x_m > 0.0
-    is_far = (away_m := np.hypot(x_m, y_m)) > np.median(away_m)
+    once = np.unique(rests.lines_world.reshape(-1, 6), axis=0, return_index=True)[1]  # one line is seen in many pieces
+    is_far = (away_m := np.hypot(x_m, y_m)) > np.median(away_m[once])
     yield from ((name, names != name, False) for name in dict.fromkeys(rests.landmarks))
     yield from ((LEFT, ~is_left, False), (RIGHT, is_left, False), (NEAR, is_far, True), (FAR, ~is_far, True))
 
