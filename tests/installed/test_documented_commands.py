@@ -41,7 +41,7 @@ NOT_RUN = {
     r"harvey follow (BAG|ros2:|drive.mp4|pictures)": "a robot, or a recording; the tests of harvey-ros2 make some",
     r"harvey tell runs/": "a run that goes on; the tests of what is told start one",
     r"traced_paths": "the path tracer",
-    r"harvey explore |survey --(world|out)|runs/\*": "minutes, or runs in a wrong building; the tests of harvey-survey do it",
+    r"harvey explore |survey --(world|out)|runs/\*": "minutes, or runs in a wrong building; harvey-survey tests it",
     r"harvey experiment (explore|people) ": "minutes; the tests of both packages drive missions of theirs",
     r"harvey serve runs/": "a run that another command is driving; the tests of harvey-serve drive one",
     r"--go-on": "a campaign that was cut off; the laws of campaigns cut many off",

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from generated_boards import Bench, effect_on, mirrored, to_world
 from harvey.testing import plain_robot
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
+from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, update_door
 from knowledge_sources.methods.motion import (
     compute_bearing,
     compute_free_space,
@@ -167,20 +167,6 @@ def test_where_edges_are_linearised_does_not_matter(seed: int, step: tuple[float
     other = _solve(_Edges(offsets - slopes @ np.array(step), slopes, line), at, prior, covariance)
     assert one is not None and other is not None
     assert is_same(one.world_from_robot, other.world_from_robot, 1e-6)
-
-
-@settings(max_examples=60)
-@given(st.lists(st.floats(MIN_LOG_RATIO, 5.0), min_size=1, max_size=4))
-def test_what_a_door_looks_like_from_one_place_counts_once_and_open_as_shut(ratios: list[float]) -> None:
-    """Shut is as open with the other sign; of looks from one place all that counts is what the strongest says."""
-    for sign in (1.0, -1.0):
-        known: DoorState | None = None
-        odds, said = -sign * PRIOR_LOG_ODDS, 0.0
-        for number, ratio in enumerate(ratios):
-            picture = DoorPicture(f"CameraPicture-{number}", (0.0, 0.0, 9.0, 9.0), 1.0, 2.0, 0.3, sign * ratio, "")
-            known = update_door(known, "door", ("a", "b"), picture, 1.0, is_believed_shut=sign < 0.0) or known
-            odds, said = odds + sign * max(ratio - said, 0.0), max(ratio, said)
-            assert known is not None and known.log_odds == pytest.approx(odds)
 
 
 @settings(max_examples=40)
