@@ -149,7 +149,7 @@ class DoorMachine(RuleBasedStateMachine):
         self.name_state()
 
     def name_state(self) -> None:
-        """Two that tell so shut it; what shut it once is held until it is open. As certain as what it says is likely."""
+        """Two that tell so shut it; what shut it once is held until it is open. As certain as it is likely."""
         assert self.known is not None
         enough = len(self.views) + self.is_touched >= MIN_PICTURES
         is_shut = self.known.log_odds >= SHUT_LOG_ODDS and enough
