@@ -62,14 +62,6 @@ def test_looks_never_add_more_than_all_that_they_say(some: list[Look]) -> None:
     assert abs(add_looks(some, ALIKE)) <= sum(abs(look.log_ratio) for look in some) + 1e-9
 
 
-@given(ratios, ratios)
-def test_looks_from_far_apart_add_whole(one: float, other: float) -> None:
-    far = [Look(Pose2(0.0, 0.0, 0.0), one), Look(Pose2(ALIKE.step_m, 0.0, 0.0), other)]
-    turned = [Look(Pose2(0.0, 0.0, 0.0), one), Look(Pose2(0.0, 0.0, ALIKE.turn_rad), other)]
-    assert add_looks(far, ALIKE) == pytest.approx(one + other)
-    assert add_looks(turned, ALIKE) == pytest.approx(one + other)
-
-
 @given(st.floats(0.0, 1.0), st.floats(0.1, 5.0), st.floats(0.0, 1.0))
 def test_of_two_looks_the_weaker_adds_what_is_not_common(part: float, strong: float, share: float) -> None:
     at = Pose2(part * ALIKE.step_m, 0.0, 0.0)
