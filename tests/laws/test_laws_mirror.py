@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -25,12 +24,10 @@ from knowledge_sources.methods.motion import (
     measure_progress,
 )
 from knowledge_sources.methods.motion.pure_pursuit import compute_curvature_to
-from knowledge_sources.methods.motion.routes import find_shortest_route
 from knowledge_sources.methods.pose import planar_from_points
 from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
 from knowledge_sources.methods.verification import predict_color_check
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from world_models.actuator import ActuatorModel
 from world_models.entries import DoorPicture, DoorState, Leg, Milestone
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
@@ -82,46 +79,6 @@ def test_steering(start: Pose2, end: Pose2, here: Pose2, frame: Pose2) -> None:
     # Beside a line from west to east, left is where y is larger.
     east = make_leg(Pose2(0.0, 0.0, 0.0), Pose2(5.0, 0.0, 0.0))
     assert measure_progress(east, here) == pytest.approx((5.0 - here.x_m, here.y_m))
-
-
-@settings(max_examples=60)
-@given(st.floats(-3.0, 3.0), st.floats(-2.0, 2.0))
-def test_dead_reckoning(turn_rad: float, move_m: float) -> None:
-    actuator = ActuatorModel()
-    left, right = actuator.predict_motion(turn_rad, move_m), actuator.predict_motion(-turn_rad, move_m)
-    assert is_same(right, flip(left))
-    spread = np.array(actuator.motion_covariance(turn_rad, move_m))
-    other = np.array(actuator.motion_covariance(-turn_rad, move_m))
-    assert np.allclose(other, spread * np.outer(SIGNS, SIGNS), atol=1e-12)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.tuples(st.floats(1.5, 6.0), st.floats(-1.5, 1.5)), min_size=1, max_size=3), st.floats(-1.4, 1.4),
-       st.floats(-1.4, 1.4), free_poses)
-def test_routes(things: list[tuple[float, float]], from_y: float, to_y: float, frame: Pose2) -> None:
-    """The same length on the other side; turned and shifted the same way points."""
-    room = np.array([(0.0, -2.0), (8.0, -2.0), (8.0, 2.0), (0.0, 2.0)])
-    squares = [np.array([(x - 0.3, y - 0.3), (x + 0.3, y - 0.3), (x + 0.3, y + 0.3), (x - 0.3, y + 0.3)])
-               for x, y in things]
-    ends = np.array([(0.6, from_y), (7.4, to_y)])
-
-    def length(change: Pose2 | None) -> float | None:
-        """Of the shortest route; mirrored where no frame is given."""
-        def put(points: Floats) -> Floats:
-            if change is None:
-                return np.asarray(points * (1.0, -1.0))
-            c, s = math.cos(change.heading_rad), math.sin(change.heading_rad)
-            return np.asarray(points @ np.array([[c, s], [-s, c]]) + (change.x_m, change.y_m))
-
-        free = compute_free_space(put(room), [put(square) for square in squares], 0.4)
-        open_floor = compute_free_space(put(room), [put(square) for square in squares], 0.0)
-        route = find_shortest_route(free, *put(ends), lambda: open_floor)
-        return None if route is None else float(shapely.LineString(route).length)
-
-    own = length(Pose2(0.0, 0.0, 0.0))
-    for other in (length(None), length(frame)):
-        assert (own is None) == (other is None)
-        assert own is None or other == pytest.approx(own, abs=0.02)
 
 
 @settings(max_examples=30, deadline=None)
