@@ -13,7 +13,16 @@ from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
 from knowledge_sources.model.surveyor import Surveyor
-from world_models.entries import Certificate, Evidence, LineMatch, Milestone, PoseFix, Segments, diagonal
+from world_models.entries import (
+    SHARED_SIGMA_M,
+    Certificate,
+    Evidence,
+    LineMatch,
+    Milestone,
+    PoseFix,
+    Segments,
+    diagonal,
+)
 from world_models.frames import Pose2
 
 SOURCE, ROBOT, HERE, THERE = Surveyor(), plain_robot(), Pose2(2.0, 1.8, 0.05), Pose2(3.5, 2.2, -0.1)
@@ -55,6 +64,7 @@ def test_what_stands_beside_is_told_and_looks_add_up(case: tuple[str, float, flo
     looks = tell(about, *(look(*by, pose, seed=seed) for pose in (HERE, THERE)))
     one, both, twice, turned = (weigh_rivals(about, x).rivals for x in (looks[:1], looks, looks * 2, looks[::-1]))
     (first, *_), (beside, *_) = ([r for r in rivals if r.kind != "chance"] for rivals in (one, both))
+    assert all(told.explanations[1].sigma >= SHARED_SIGMA_M for told in looks)  # what all pictures share
     assert turned == both and first.p < beside.p and beside.sigma < first.sigma
     assert sum(by) == pytest.approx(beside.off, abs=2.0 * beside.sigma) and abs(beside.off) > 3.0 * beside.sigma
     assert [(r.p, r.sigma) for r in twice] == [pytest.approx((r.p, r.sigma)) for r in both]
