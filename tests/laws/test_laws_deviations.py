@@ -15,6 +15,7 @@ from blackboard import Post
 from generated_boards import LENGTH_M, WIDTH_M, Bench
 from harvey.testing import HALL, STUDY, plain_robot
 from knowledge_sources.methods.floor.footprints import find_same
+from knowledge_sources.methods.floor.revise_frame import is_width
 from knowledge_sources.model.door_toucher import door_toucher
 from knowledge_sources.reads.motion_between import MOTION, bound_wheels_m
 from knowledge_sources.senses.bumper_monitor import bumper_monitor
@@ -76,11 +77,18 @@ def feel_one_side(earlier_rad: float, later_rad: float) -> float:
     return float(bench.ask(bumper_monitor, felt.entry) is not None)
 
 
+def doubt_walls(wall_m: float, camera_m: float) -> float:
+    """Whether walls that seem farther apart may stand where the file has them."""
+    found = Difference("walls", (Rival("wall", "walls farther apart", 9.0, 0.9999, 0.05, wall_m),), (), 1.0)
+    return float(not is_width(found, camera_m))
+
+
 ROWS: Mapping[str, tuple[Callable[..., float], dict[str, Any]]] = {
     "a touch in a doorway": (refuse_touch, {"place_m": 0.005, "heading_rad": 0.005, "direction_rad": 0.05}),
     "the drift of the wheels": (learn_drift, {"before_per_m": 0.002, "turned_rad": 0.002, "heading_rad": 0.002}),
     "two sights of a thing": (is_same_thing, {"known_m": 0.005, "seen_m": 0.005}),
     "wheels that are suspected": (believe_wheels, {"wheels": 0.005, "reach": 0.005}),
+    "walls that seem farther apart": (doubt_walls, {"wall_m": 0.002, "camera_m": 0.002}),
     "two touches on one side": (feel_one_side, {"earlier_rad": 0.05, "later_rad": 0.05}),
 }
 LARGE = 100.0

@@ -17,11 +17,13 @@ from knowledge_sources.methods.floor import find_floor, measure_first_seen_m
 from knowledge_sources.methods.floor.looks_round import sees
 from knowledge_sources.methods.motion import CLEARANCES_M, SubgoalPlanner
 from knowledge_sources.methods.motion.subgoals import (
+    LEFT_ROOM_M,
     LOOKOUT_DIRECTIONS,
     LOOKOUT_DISTANCES_M,
     LOOKOUT_SAME_SIDE_M,
     MIN_DOORWAY_CLEARANCE_M,
     MIN_LOOKOUT_CHANGE_M,
+    MIN_TOLERANCE_M,
     WAY_TOLERANCE_M,
 )
 from knowledge_sources.reads import find_robot
@@ -136,6 +138,16 @@ def test_it_never_turns_back_on_its_way_through_doors(begin_m: float, end_m: flo
     assert way is not None
     ahead = [float(first.outward_from("west") @ p.destination.in_world(robot.world).position) for p in way]
     assert (np.diff([float(first.outward_from("west") @ start), *ahead]) >= -1e-6).all()
+
+
+@pytest.mark.parametrize("room_m", [
+    -0.05, LEFT_ROOM_M + MIN_TOLERANCE_M - 1e-3, LEFT_ROOM_M + MIN_TOLERANCE_M + 1e-3, 0.5])
+def test_a_leg_is_driven_as_exactly_as_there_is_room_beside_it(room_m: float) -> None:
+    """But not more exactly than it can be, where the robot stands at something; and no less than was asked."""
+    bench = Bench(plain_robot())
+    bench.stand(4.0, 2.1 + plain_robot().radius_m + room_m, 0.1, 0.1)
+    found = plan(bench)._limit_tolerance_m(Place(HALL, 3.0, 2.0), Place(HALL, 5.0, 2.0), 0.1)
+    assert found == pytest.approx(min(0.1, max(room_m - LEFT_ROOM_M, MIN_TOLERANCE_M)), abs=2e-4)
 
 
 @pytest.mark.parametrize("beside_m", [0.02, 0.05, 0.099, 0.101, 0.3])
