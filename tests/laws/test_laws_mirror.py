@@ -9,27 +9,18 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import Bench, effect_on, mirrored, to_world
 from harvey.testing import plain_robot
 from knowledge_sources.methods.arrays import Floats
 from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, update_door
-from knowledge_sources.methods.motion import (
-    compute_bearing,
-    compute_free_space,
-    find_aim_point,
-    find_free_space,
-    measure_progress,
-)
-from knowledge_sources.methods.motion.pure_pursuit import compute_curvature_to
 from knowledge_sources.methods.pose import planar_from_points
 from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
 from knowledge_sources.methods.verification import predict_color_check
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from world_models.entries import DoorPicture, DoorState, Leg, Milestone
-from world_models.files.world_files import WORLDS, load_world
+from world_models.entries import DoorPicture, DoorState, Milestone
 from world_models.frames import Pose2, wrap_angle
 
 SIGNS = np.array([1.0, -1.0, -1.0])
@@ -52,33 +43,6 @@ def as_numbers(pose: Pose2) -> Floats:
 def is_same(one: Pose2, other: Pose2, within: float = 1e-9) -> bool:
     turn = wrap_angle(one.heading_rad - other.heading_rad)
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < within and abs(turn) < within
-
-
-def make_leg(start: Pose2, end: Pose2) -> Leg:
-    return Leg("PlanSketch-1", 0, start.x_m, start.y_m, end.x_m, end.y_m, 0.1)
-
-
-@settings(max_examples=100)
-@given(free_poses, free_poses, free_poses, free_poses)
-def test_steering(start: Pose2, end: Pose2, here: Pose2, frame: Pose2) -> None:
-    assume(math.hypot(start.x_m - end.x_m, start.y_m - end.y_m) > 0.1)
-    leg = make_leg(start, end)
-    along, left = measure_progress(leg, here)
-    point = find_aim_point(leg, along, 0.8)
-    assume(math.dist(point, here.position) > 0.01 and abs(abs(compute_bearing(point, here)) - math.pi) > 1e-6)
-    bearing, bend = compute_bearing(point, here), compute_curvature_to(point, here)
-    flipped, there = make_leg(flip(start), flip(end)), flip(here)
-    assert measure_progress(flipped, there) == pytest.approx((along, -left), abs=SMALL)
-    aim = find_aim_point(flipped, along, 0.8)
-    assert aim == pytest.approx((point[0], -point[1]), abs=1e-7)
-    assert compute_bearing(aim, there) == pytest.approx(-bearing, abs=1e-5)
-    assert compute_curvature_to(aim, there) == pytest.approx(-bend, abs=1e-4, rel=1e-5)
-    turned, moved = make_leg(frame @ start, frame @ end), frame @ here
-    assert measure_progress(turned, moved) == pytest.approx((along, left), abs=SMALL)
-    assert compute_bearing(find_aim_point(turned, along, 0.8), moved) == pytest.approx(bearing, abs=1e-5)
-    # Beside a line from west to east, left is where y is larger.
-    east = make_leg(Pose2(0.0, 0.0, 0.0), Pose2(5.0, 0.0, 0.0))
-    assert measure_progress(east, here) == pytest.approx((5.0 - here.x_m, here.y_m))
 
 
 @settings(max_examples=30, deadline=None)
@@ -161,18 +125,6 @@ def test_chance_is_what_agrees_with_the_colours_of_other_faces(faces: list[tuple
     check = predict_color_check([(colour, ()) for colour in faces])
     assert check.chance == pytest.approx(float(np.mean(shares)), abs=1e-9)
     assert (check.count, check.agreeing) == (n, 1.0) and check.is_testable == (check.chance <= 0.8)
-
-
-def test_a_room_is_as_free_as_it_is_whatever_was_asked_before() -> None:
-    """Each question has its own answer: locale, clearance and shape."""
-    world = load_world(WORLDS / "research_center.toml")
-    locale = next(name for name in world.locales for t in world.things_of(name) if t.is_obstacle)
-    asked = [(clearance_m, is_round) for clearance_m in (0.3, 0.4) for is_round in (False, True)]
-    for clearance_m, is_round in (*asked, *reversed(asked)):
-        found = find_free_space(world, locale, clearance_m, is_round=is_round)
-        plain = compute_free_space(world.outline(locale), world.obstacles(locale), clearance_m,
-                                   is_round=is_round)
-        assert found.equals(plain)
 
 
 @pytest.mark.parametrize("pose", [Pose2(2.0, 1.5, 0.3), Pose2(4.0, 1.0, -1.2), Pose2(5.0, 2.4, 2.5),

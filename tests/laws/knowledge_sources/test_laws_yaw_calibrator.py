@@ -136,14 +136,6 @@ def test_the_camera_stays_where_it_was_and_looks_where_it_looked(off: float, len
     assert effect.value.covariance == pytest.approx(np.array(way.belief.value.covariance))
 
 
-@settings(max_examples=40)
-@given(st.floats(-0.04, 0.04), st.floats(1.5, 9.0))
-def test_come_as_far_to_the_right_as_to_the_left_it_learns_the_opposite(off: float, length_m: float) -> None:
-    one, other = come(off, length_m, course_rad=0.7).camera, come(-off, length_m, course_rad=-0.7).camera
-    assert one is not None and other is not None
-    assert one.mount.yaw_rad == pytest.approx(-other.mount.yaw_rad, abs=1e-12)
-
-
 @settings(max_examples=30)
 @given(st.floats(-0.03, 0.03), st.floats(1.5, 9.0), st.floats(1.0, 4.0))
 def test_the_way_goes_on_by_the_turned_headings_until_it_is_spent(off: float, length_m: float, bent: float) -> None:

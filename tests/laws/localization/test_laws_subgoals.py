@@ -162,23 +162,6 @@ def test_a_narrow_door_is_come_to_as_exactly_as_it_leaves_room_beside_the_robot(
     assert way[0].tolerance_m == pytest.approx(wanted) and way[-1].tolerance_m == 0.01
 
 
-@pytest.mark.parametrize("y_m", [0.8, 3.2])
-def test_what_is_free_at_a_door_is_so_whatever_was_asked_before(y_m: float) -> None:
-    """Each question has its own answer: the rooms, and the margin; whatever else was asked."""
-    def stage() -> SubgoalPlanner:
-        bench = Bench(plain_robot(read_world(Source.parse(WEST, "house.toml"))))
-        bench.stand(7.3, 3.2, 0.3, 0.3)
-        bench.stand(0.8, y_m, 0.2, 0.2)
-        return plan(bench)
-
-    planner = stage()
-    questions = [((HALL, room), margin_m) for margin_m in CLEARANCES_M for room in (STUDY, "west")]
-    plain = [stage()._find_free_passage(*question) for question in questions]
-    for question, wanted in (*zip(questions, plain, strict=True), *zip(questions[::-1], plain[::-1], strict=True)):
-        assert planner._find_free_passage(*question).symmetric_difference(wanted).area < 1e-9
-    assert len({round(free.area, 6) for free in plain}) == len(plain)
-
-
 @settings(max_examples=15, deadline=None)
 @given(st.floats(1.0, 2.5), st.floats(0.9, 3.1), st.sampled_from((3.2, 4.0, 5.5)), st.floats(1.6, 2.4))
 def test_it_looks_again_from_where_that_is_best_by_way_and_by_side(
