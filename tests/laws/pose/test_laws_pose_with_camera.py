@@ -15,9 +15,11 @@ from scipy.stats import chi2
 
 from consistency import build_hall, compute_error, compute_nees
 from knowledge_sources.methods.calibration import widen
+from knowledge_sources.methods.calibration.camera_state import FOCAL, HEIGHT, compute_scale_sigma
 from knowledge_sources.methods.localization.camera_matching import compute_space_covariance
 from knowledge_sources.methods.pose import CameraEstimate, estimate_camera_and_pose
 from world_models.camera import YAW, Camera, CameraMount, move_camera, subtract_cameras
+from world_models.entries import CameraState
 from world_models.frames import Pose2
 
 CAMERA, MOUNT = Camera.from_field_of_view(np.radians(65.0)), CameraMount(1.0, 0.1, 0.02, 0.01, -0.02)
@@ -140,6 +142,16 @@ def test_a_step_of_the_camera_is_what_its_difference_says(seed: int) -> None:
     back = np.zeros(7)
     back[4] = -step[4] ** 2  # the focal length grows by a factor: (1 + s)(1 - s)
     assert np.allclose(subtract_cameras(*move_camera(*moved, -step), CAMERA, MOUNT), back, atol=1e-9)
+
+
+@given(st.floats(0.3, 2.0), st.floats(0.001, 0.1), st.floats(0.001, 0.1))
+def test_scale_is_known_by_the_focal_length_and_by_the_height_as_a_part_of_it(
+    height_m: float, sigma_m: float, focal: float
+) -> None:
+    known = np.diag(CAMERA_SIGMA**2)
+    known[FOCAL, FOCAL], known[HEIGHT, HEIGHT] = focal**2, sigma_m**2
+    camera = CameraState(CAMERA, replace(MOUNT, height_m=height_m), covariance=tuple(map(tuple, known.tolist())))
+    assert compute_scale_sigma(camera) ** 2 == pytest.approx(focal**2 + (sigma_m / height_m) ** 2)
 
 
 def test_the_covariance_in_space_is_that_of_drawn_cameras() -> None:
