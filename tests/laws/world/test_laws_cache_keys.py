@@ -7,7 +7,18 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+
+from generated_boards import to_world
+from harvey.testing import HOUSE, plain_robot
+from knowledge_sources.methods.localization.aliasing import _find_visible_on_grid
+from knowledge_sources.methods.verification import predict_face_colors, predict_lines
+from world_models.building.world import World
+from world_models.files.toml.source import Source
+from world_models.files.world_files import read_world
+from world_models.frames import Pose2
+from world_models.robot import RobotModel
 
 ROOT = Path(__file__).parents[3]
 ROOMS = ("knowledge_sources", "world_models")
@@ -40,9 +51,10 @@ def list_lacking(text: str) -> Iterator[tuple[str, set[str]]]:
         for call in ast.walk(function):
             if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr == "cached":
                 what, _, key, compute = call.args
-                told, asked = names_in(key) | names_in(call.func.value), names_in(compute)
+                told, asked = names_in(key), names_in(compute)
                 for _ in made:
                     told |= {name for known in tuple(told) for name in made.get(known, ())}
+                told |= names_in(call.func.value)
                 for name in asked & inner.keys():
                     asked = asked | names_in(inner[name]) - list_made(inner[name]).keys()
                 for _ in made:
@@ -62,3 +74,28 @@ def test_a_key_that_is_too_small_is_seen() -> None:
             "    return world.cached('a', 9, {}, lambda: see(room, wide))")
     assert [dict(list_lacking(text.format(key))) for key in ("room", "(room, margin)", "(room, wide)")] == [
         {"'a'": {"wide"}}, {"'a'": set()}, {"'a'": set()}]
+
+
+def describe_view(robot: RobotModel, pose: Pose2) -> str:
+    """What is expected to be seen from a pose: lines, colours, and lines from the grid."""
+    colors = [(tuple(color), len(points)) for color, points in predict_face_colors(robot, pose)]
+    on_grid, _ = _find_visible_on_grid(robot, pose)
+    return repr((predict_lines(robot, pose).segments_px.tolist(), colors, on_grid.tolist()))
+
+
+def test_what_is_seen_from_a_pose_is_so_whatever_was_asked_before() -> None:
+    """From another place in the same direction, in another direction from the same place, from another height."""
+    def build(high_m: float, world: World) -> RobotModel:
+        robot = plain_robot(world)
+        return replace(robot, mount=replace(robot.mount, height_m=high_m))
+
+    def read() -> World:
+        return read_world(Source.parse(HOUSE, "house.toml"))
+
+    known, seen = read(), list[str]()
+    for high_m in (1.0, 1.3):
+        for x_m, heading in ((2.0, 0.0), (4.0, 0.0), (2.0, 1.0)):
+            pose = to_world(Pose2(x_m, 2.0, heading))
+            seen.append(describe_view(build(high_m, known), pose))
+            assert seen[-1] == describe_view(build(high_m, read()), pose)
+    assert len(set(seen)) == len(seen)
