@@ -12,9 +12,9 @@ from generated_boards import Bench, effect_on, made, mirrored, reasons, to_world
 from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
+from knowledge_sources.model import surveyor
 from knowledge_sources.model.surveyor import Surveyor
 from world_models.entries import (
-    SHARED_SIGMA_M,
     Certificate,
     Evidence,
     LineMatch,
@@ -64,7 +64,6 @@ def test_what_stands_beside_is_told_and_looks_add_up(case: tuple[str, float, flo
     looks = tell(about, *(look(*by, pose, seed=seed) for pose in (HERE, THERE)))
     one, both, twice, turned = (weigh_rivals(about, x).rivals for x in (looks[:1], looks, looks * 2, looks[::-1]))
     (first, *_), (beside, *_) = ([r for r in rivals if r.kind != "chance"] for rivals in (one, both))
-    assert all(told.explanations[1].sigma >= SHARED_SIGMA_M for told in looks)  # what all pictures share
     assert turned == both and first.p < beside.p and beside.sigma < first.sigma
     assert sum(by) == pytest.approx(beside.off, abs=2.0 * beside.sigma) and abs(beside.off) > 3.0 * beside.sigma
     assert [(r.p, r.sigma) for r in twice] == [pytest.approx((r.p, r.sigma)) for r in both]
@@ -77,6 +76,12 @@ def test_what_stands_beside_is_told_and_looks_add_up(case: tuple[str, float, flo
 @given(st.sampled_from((HERE, THERE, mirrored(HERE))), st.integers(0, 99), st.floats(-0.01, 0.01))
 def test_of_a_building_as_it_was_measured_nothing_is_told(pose: Pose2, seed: int, by_m: float) -> None:
     assert not made(Bench.ask((seen := look(by_m, by_m, pose, seed=seed))[0], SOURCE, seen[1]), Evidence)
+
+
+def test_what_all_pictures_share_makes_each_less_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(surveyor, "SHARED_SIGMA_M", 1.0)
+    (wider,) = tell(WIDTH, look(0.1))
+    assert wider.explanations[1].sigma >= 1.0 and not tell(DOOR, look(0.0, 0.1))  # of a door not sure enough
 
 
 def test_a_door_is_told_by_a_sure_place_alone() -> None:
