@@ -13,7 +13,7 @@ from pathlib import Path
 from generated_boards import to_world
 from harvey.testing import HOUSE, plain_robot
 from knowledge_sources.methods.localization.aliasing import _find_visible_on_grid
-from knowledge_sources.methods.verification import predict_face_colors, predict_lines
+from knowledge_sources.methods.verification import predict_lines
 from world_models.building.world import World
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
@@ -77,10 +77,9 @@ def test_a_key_that_is_too_small_is_seen() -> None:
 
 
 def describe_view(robot: RobotModel, pose: Pose2) -> str:
-    """What is expected to be seen from a pose: lines, colours, and lines from the grid."""
-    colors = [(tuple(color), len(points)) for color, points in predict_face_colors(robot, pose)]
+    """The lines that are expected to be seen from a pose, and from the grid near it."""
     on_grid, _ = _find_visible_on_grid(robot, pose)
-    return repr((predict_lines(robot, pose).segments_px.tolist(), colors, on_grid.tolist()))
+    return repr((predict_lines(robot, pose).segments_px.tolist(), on_grid.tolist()))
 
 
 def test_what_is_seen_from_a_pose_is_so_whatever_was_asked_before() -> None:
