@@ -9,30 +9,18 @@ import math
 
 import numpy as np
 import pytest
-import shapely
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from generated_boards import Bench, effect_on, mirrored, to_world
 from harvey.testing import plain_robot
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, PRIOR_LOG_ODDS, update_door
-from knowledge_sources.methods.motion import (
-    compute_bearing,
-    compute_free_space,
-    find_aim_point,
-    find_free_space,
-    measure_progress,
-)
-from knowledge_sources.methods.motion.pure_pursuit import compute_curvature_to
-from knowledge_sources.methods.motion.routes import find_shortest_route
+from knowledge_sources.methods.doors import MAX_LOG_ODDS, MIN_LOG_RATIO, update_door
 from knowledge_sources.methods.pose import planar_from_points
 from knowledge_sources.methods.tracking.edge_alignment import _Edges, _solve
 from knowledge_sources.methods.verification import predict_color_check
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
-from world_models.actuator import ActuatorModel
-from world_models.entries import DoorPicture, DoorState, Leg, Milestone
-from world_models.files.world_files import WORLDS, load_world
+from world_models.entries import DoorPicture, DoorState, Milestone
 from world_models.frames import Pose2, wrap_angle
 
 SIGNS = np.array([1.0, -1.0, -1.0])
@@ -55,73 +43,6 @@ def as_numbers(pose: Pose2) -> Floats:
 def is_same(one: Pose2, other: Pose2, within: float = 1e-9) -> bool:
     turn = wrap_angle(one.heading_rad - other.heading_rad)
     return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) < within and abs(turn) < within
-
-
-def make_leg(start: Pose2, end: Pose2) -> Leg:
-    return Leg("PlanSketch-1", 0, start.x_m, start.y_m, end.x_m, end.y_m, 0.1)
-
-
-@settings(max_examples=100)
-@given(free_poses, free_poses, free_poses, free_poses)
-def test_steering(start: Pose2, end: Pose2, here: Pose2, frame: Pose2) -> None:
-    assume(math.hypot(start.x_m - end.x_m, start.y_m - end.y_m) > 0.1)
-    leg = make_leg(start, end)
-    along, left = measure_progress(leg, here)
-    point = find_aim_point(leg, along, 0.8)
-    assume(math.dist(point, here.position) > 0.01 and abs(abs(compute_bearing(point, here)) - math.pi) > 1e-6)
-    bearing, bend = compute_bearing(point, here), compute_curvature_to(point, here)
-    flipped, there = make_leg(flip(start), flip(end)), flip(here)
-    assert measure_progress(flipped, there) == pytest.approx((along, -left), abs=SMALL)
-    aim = find_aim_point(flipped, along, 0.8)
-    assert aim == pytest.approx((point[0], -point[1]), abs=1e-7)
-    assert compute_bearing(aim, there) == pytest.approx(-bearing, abs=1e-5)
-    assert compute_curvature_to(aim, there) == pytest.approx(-bend, abs=1e-4, rel=1e-5)
-    turned, moved = make_leg(frame @ start, frame @ end), frame @ here
-    assert measure_progress(turned, moved) == pytest.approx((along, left), abs=SMALL)
-    assert compute_bearing(find_aim_point(turned, along, 0.8), moved) == pytest.approx(bearing, abs=1e-5)
-    # Beside a line from west to east, left is where y is larger.
-    east = make_leg(Pose2(0.0, 0.0, 0.0), Pose2(5.0, 0.0, 0.0))
-    assert measure_progress(east, here) == pytest.approx((5.0 - here.x_m, here.y_m))
-
-
-@settings(max_examples=60)
-@given(st.floats(-3.0, 3.0), st.floats(-2.0, 2.0))
-def test_dead_reckoning(turn_rad: float, move_m: float) -> None:
-    actuator = ActuatorModel()
-    left, right = actuator.predict_motion(turn_rad, move_m), actuator.predict_motion(-turn_rad, move_m)
-    assert is_same(right, flip(left))
-    spread = np.array(actuator.motion_covariance(turn_rad, move_m))
-    other = np.array(actuator.motion_covariance(-turn_rad, move_m))
-    assert np.allclose(other, spread * np.outer(SIGNS, SIGNS), atol=1e-12)
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.tuples(st.floats(1.5, 6.0), st.floats(-1.5, 1.5)), min_size=1, max_size=3), st.floats(-1.4, 1.4),
-       st.floats(-1.4, 1.4), free_poses)
-def test_routes(things: list[tuple[float, float]], from_y: float, to_y: float, frame: Pose2) -> None:
-    """The same length on the other side; turned and shifted the same way points."""
-    room = np.array([(0.0, -2.0), (8.0, -2.0), (8.0, 2.0), (0.0, 2.0)])
-    squares = [np.array([(x - 0.3, y - 0.3), (x + 0.3, y - 0.3), (x + 0.3, y + 0.3), (x - 0.3, y + 0.3)])
-               for x, y in things]
-    ends = np.array([(0.6, from_y), (7.4, to_y)])
-
-    def length(change: Pose2 | None) -> float | None:
-        """Of the shortest route; mirrored where no frame is given."""
-        def put(points: Floats) -> Floats:
-            if change is None:
-                return np.asarray(points * (1.0, -1.0))
-            c, s = math.cos(change.heading_rad), math.sin(change.heading_rad)
-            return np.asarray(points @ np.array([[c, s], [-s, c]]) + (change.x_m, change.y_m))
-
-        free = compute_free_space(put(room), [put(square) for square in squares], 0.4)
-        open_floor = compute_free_space(put(room), [put(square) for square in squares], 0.0)
-        route = find_shortest_route(free, *put(ends), lambda: open_floor)
-        return None if route is None else float(shapely.LineString(route).length)
-
-    own = length(Pose2(0.0, 0.0, 0.0))
-    for other in (length(None), length(frame)):
-        assert (own is None) == (other is None)
-        assert own is None or other == pytest.approx(own, abs=0.02)
 
 
 @settings(max_examples=30, deadline=None)
@@ -169,20 +90,6 @@ def test_where_edges_are_linearised_does_not_matter(seed: int, step: tuple[float
     assert is_same(one.world_from_robot, other.world_from_robot, 1e-6)
 
 
-@settings(max_examples=60)
-@given(st.lists(st.floats(MIN_LOG_RATIO, 5.0), min_size=1, max_size=4))
-def test_what_a_door_looks_like_from_one_place_counts_once_and_open_as_shut(ratios: list[float]) -> None:
-    """Shut is as open with the other sign; of looks from one place all that counts is what the strongest says."""
-    for sign in (1.0, -1.0):
-        known: DoorState | None = None
-        odds, said = -sign * PRIOR_LOG_ODDS, 0.0
-        for number, ratio in enumerate(ratios):
-            picture = DoorPicture(f"CameraPicture-{number}", (0.0, 0.0, 9.0, 9.0), 1.0, 2.0, 0.3, sign * ratio, "")
-            known = update_door(known, "door", ("a", "b"), picture, 1.0, is_believed_shut=sign < 0.0) or known
-            odds, said = odds + sign * max(ratio - said, 0.0), max(ratio, said)
-            assert known is not None and known.log_odds == pytest.approx(odds)
-
-
 @settings(max_examples=40)
 @given(st.floats(-6.0, 6.0), st.floats(MIN_LOG_RATIO, 4.0), st.sampled_from((1.0, -1.0)))
 def test_what_was_believed_of_a_door_by_pictures_that_are_not_kept_stays(
@@ -218,18 +125,6 @@ def test_chance_is_what_agrees_with_the_colours_of_other_faces(faces: list[tuple
     check = predict_color_check([(colour, ()) for colour in faces])
     assert check.chance == pytest.approx(float(np.mean(shares)), abs=1e-9)
     assert (check.count, check.agreeing) == (n, 1.0) and check.is_testable == (check.chance <= 0.8)
-
-
-def test_a_room_is_as_free_as_it_is_whatever_was_asked_before() -> None:
-    """Each question has its own answer: locale, clearance and shape."""
-    world = load_world(WORLDS / "research_center.toml")
-    locale = next(name for name in world.locales for t in world.things_of(name) if t.is_obstacle)
-    asked = [(clearance_m, is_round) for clearance_m in (0.3, 0.4) for is_round in (False, True)]
-    for clearance_m, is_round in (*asked, *reversed(asked)):
-        found = find_free_space(world, locale, clearance_m, is_round=is_round)
-        plain = compute_free_space(world.outline(locale), world.obstacles(locale), clearance_m,
-                                   is_round=is_round)
-        assert found.equals(plain)
 
 
 @pytest.mark.parametrize("pose", [Pose2(2.0, 1.5, 0.3), Pose2(4.0, 1.0, -1.2), Pose2(5.0, 2.4, 2.5),

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from generated_boards import mirrored, to_world
 from harvey.testing import HALL, HOUSE, plain_robot
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.doors import predict_opening, update_door
+from knowledge_sources.methods.doors import predict_opening
 from knowledge_sources.methods.floor import build_free_floor, list_corners
 from knowledge_sources.methods.floor.footprints import (
     deepen,
@@ -26,7 +26,6 @@ from knowledge_sources.methods.floor.footprints import (
 from knowledge_sources.methods.localization.place_odds import compute_place_odds, is_within_reach
 from knowledge_sources.methods.matching import match_lines, match_on_floor
 from knowledge_sources.methods.verification import predict_lines
-from world_models.entries import DoorPicture, DoorState
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose2, flattened, wrap_angle
@@ -149,29 +148,6 @@ def test_a_place_is_within_reach_as_in_a_mirror_and_as_elsewhere(off: Pose2, fra
     plain = is_within_reach(told @ off, COVARIANCE, told, wide)
     assert is_within_reach(flip(told @ off), COVARIANCE, flip(told), wide * np.outer(SIGNS, SIGNS)) == plain
     assert is_within_reach(frame @ told @ off, turn @ COVARIANCE @ turn.T, frame @ told, turn @ wide @ turn.T) == plain
-
-
-@settings(max_examples=40)
-@given(st.lists(st.tuples(metres, metres, st.floats(-3.0, 3.0), st.floats(-4.5, 4.5)), min_size=1, max_size=5), frames)
-def test_what_is_believed_of_a_door_is_as_in_a_mirror_and_as_elsewhere(
-    looks: list[tuple[float, float, float, float]], frame: Pose2
-) -> None:
-    def believe(put: Any) -> list[float]:
-        known: DoorState | None = None
-        said = []
-        for number, (x, y, heading, ratio) in enumerate(looks):
-            at = put(Pose2(x, y, heading))
-            picture = DoorPicture(f"CameraPicture-{number}", (0.0, 0.0, 9.0, 9.0), at.x_m, at.y_m, at.heading_rad,
-                                  ratio, "")
-            known = update_door(known, "door", ("a", "b"), picture, 1.0, is_believed_shut=False) or known
-            said.append(0.0 if known is None else known.log_odds)
-            if known is not None:  # as certain as what it says is likely
-                sign = -1.0 if known.state == "open" else 1.0
-                assert known.certainty == pytest.approx(1.0 / (1.0 + math.exp(-sign * known.log_odds)))
-        return said
-
-    plain = believe(lambda pose: pose)
-    assert believe(flip) == pytest.approx(plain) and believe(lambda pose: frame @ pose) == pytest.approx(plain)
 
 
 @pytest.mark.parametrize("pose", [Pose2(5.0, 1.4, 0.1), Pose2(4.2, 2.9, -0.3), Pose2(6.6, 2.0, 0.2)])

@@ -74,10 +74,3 @@ def test_the_wrong_button_is_noticed_by_the_next_milestone(tmp_path: Path) -> No
     after = [c["verdict"] for cycle, c in made(decisions, "Certificate") if cycle > told]
     assert after and "verified" not in after
     assert result.outcome != "reached" and result.collisions == 0
-
-
-def test_the_same_seed_gives_the_same_journal(
-    helped: tuple[Path, MissionResult, list[dict[str, object]]], tmp_path: Path
-) -> None:
-    driven(tmp_path, HELPER)
-    assert (tmp_path / "run" / "journal.jsonl").read_bytes() == (helped[0] / "run" / "journal.jsonl").read_bytes()

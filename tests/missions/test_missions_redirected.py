@@ -60,9 +60,9 @@ def left_active(decisions: Sequence[Decision]) -> dict[str, Any]:
             if (entry.value.is_open if isinstance(entry.value, Milestone) else entry.value.is_active)}
 
 
-@pytest.mark.parametrize("cycle", [0, 4, 30, 47, 60, 95])
+@pytest.mark.parametrize("cycle", [0, 47, 95])
 def test_it_goes_to_where_it_was_asked_to_go_instead(cycle: int, tmp_path: Path) -> None:
-    """With the first goal, at once after it, while it waits for a milestone, while it drives, and in the other room."""
+    """With the first goal, while it waits for a milestone, and in the other room."""
     result, decisions = drive(two_doors(tmp_path), Asks(cycle, BACK))
     assert (result.outcome, result.collisions, result.false_accepts) == ("reached", 0, 0)
     assert result.error_m < 0.0254
@@ -72,14 +72,6 @@ def test_it_goes_to_where_it_was_asked_to_go_instead(cycle: int, tmp_path: Path)
     assert abandoned.id == first.id and abandoned.value.status == "abandoned"
     assert second.because[0].id == asked.id and second.value.destination.locale == "study"
     assert left_active(decisions) == {}
-
-
-def test_what_cannot_be_understood_is_answered_and_it_goes_on_as_before(tmp_path: Path) -> None:
-    plain, _ = drive(two_doors(tmp_path))
-    result, decisions = drive(two_doors(tmp_path), Asks(40, "Go to the attic"))
-    assert (result.outcome, result.path_length_m) == (plain.outcome, plain.path_length_m) and plain.outcome == "reached"
-    assert [entry.value.answer for entry in made(decisions, Redirection)] == [
-        "which cannot be: no room of two-doors answers to 'the attic'"]
 
 
 def test_by_the_missions_file_it_is_asked_at_its_time_and_once_after_a_crash(tmp_path: Path) -> None:

@@ -81,29 +81,6 @@ def test_told_that_a_thing_on_the_way_is_gone_it_goes_where_it_stood(tmp_path: P
         "study/table-1 is gone (user)"]
 
 
-def test_told_twice_it_is_told_twice_and_revises_once(tmp_path: Path) -> None:
-    result, decisions = drive(two_doors(tmp_path, (SHUT, (3.5, "north-door", "shut"))))
-    assert (result.outcome, result.collisions) == ("reached", 0)
-    assert answers(decisions) == ["and believes it from now on", "which it knew already"]
-    assert len(made(decisions, LocaleFrame)) == 2  # one of each room of the door
-    assert routes(decisions) == [["north-door"], ["south-door"]]
-
-
-def test_told_that_it_is_open_again_it_is_as_the_file_says(tmp_path: Path) -> None:
-    result, decisions = drive(two_doors(tmp_path, (SHUT, (5.0, "north-door", "open"))))
-    assert (result.outcome, result.collisions) == ("reached", 0)
-    frames = made(decisions, LocaleFrame)
-    assert [bool(entry.value.changes) for entry in frames] == [True, True, False, False]
-    assert all(entry.value is entry.value.filed or entry.value.filed is None for entry in frames[2:])
-    assert answers(decisions) == ["and believes it from now on", "and believes it from now on"]
-
-
-def test_told_that_the_only_door_is_shut_it_is_blocked_and_says_by_what(tmp_path: Path) -> None:
-    result, _ = drive(two_doors(tmp_path, ((1.0, "south-door", "shut"), SHUT)))
-    assert (result.outcome, result.collisions) == ("blocked", 0)
-    assert result.reason == "no passage for wheels leads from study to parlour; north-door is shut; south-door is shut"
-
-
 def test_told_while_it_rolls_it_stops_and_goes_another_way(tmp_path: Path) -> None:
     """Rolling to one door, it is told that it is shut: it stops with the next picture, and goes by the other."""
     stage = two_doors(tmp_path, ((1.5, "north-door", "shut"),), start=(11.0, 3.5), goal=(4.0, 5.0),
@@ -115,27 +92,6 @@ def test_told_while_it_rolls_it_stops_and_goes_another_way(tmp_path: Path) -> No
     courses = [entry for entry in made(decisions, Course) if entry.cycle > told - 4]
     assert [entry.value.is_rolling for entry in courses[:2]] == [True, False] and courses[0].cycle < told
     assert courses[1].cycle <= told + 3
-
-
-def test_told_of_what_is_not_there_it_says_so_and_revises_nothing(tmp_path: Path) -> None:
-    """A file cannot say so, but somebody can: the mission goes on as if nothing had been said."""
-    tellings = [UserReport("study/sofa-1", "gone"), UserReport("study/table-1", "shut"),
-                UserReport("nowhere/door", "shut"),
-                UserReport("north-door", "gone"), UserReport("north-door", "open")]
-    decisions: list[Decision] = []
-    agent = build_agent(build_head(stage := two_doors(tmp_path), SEED))
-    scheduler = agent.scheduler(ports=[WorldPort(agent.store)], sinks=[decisions.append])
-    tell_robot(scheduler, agent.robot)
-    scheduler.post([Post(build_head(stage, SEED).task())], USER)
-    for telling in tellings:
-        scheduler.post([Post(telling)], USER)
-        while scheduler.step() is not None:
-            pass
-    assert made(decisions, LocaleFrame) == [] and not any(d.refused for d in decisions)
-    said = answers(decisions)
-    assert all(answer.startswith("which cannot be: expected ") for answer in said[:4])
-    assert "open door of study (north-door, south-door)" in said[1].replace("an open", "open")
-    assert said[4] == "which it knew already"
 
 
 def test_told_nonsense_of_a_room_it_still_asks_for_that_room(tmp_path: Path) -> None:

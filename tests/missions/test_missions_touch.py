@@ -64,14 +64,6 @@ def test_each_collision_is_felt_once_by_its_motion_and_nothing_else_is(touched: 
         assert [motion.cycle for motion in motions if motion.because == contact.because] == [contact.cycle]
 
 
-def test_ranges_come_with_each_picture(touched: tuple[MissionResult, Path]) -> None:
-    _, out = touched
-    frames, ranges = observed(out, "CameraPicture"), observed(out, "Ranges")
-    assert [frame.because for frame in frames] == [reading.because for reading in ranges]
-    nearest_m = min(d for reading in ranges for d in reading.fields["distances_m"] if d is not None)
-    assert nearest_m == pytest.approx(0.35, abs=0.08)  # the radius: it touches something
-
-
 def test_why_it_stopped_walks_to_what_it_touched(touched: tuple[MissionResult, Path]) -> None:
     history = Timeline(RunDirectory(touched[1]).journal)
     stopped = [entry for ref in history.refs if ref.startswith("Discrepancy-") and ref.endswith(".0")

@@ -16,7 +16,6 @@ from harvey.wiring import knowledge_sources
 from knowledge_sources.settings import Settings
 from sim.scenario import parse_scenario
 from sim.stage import build_stage
-from world_models.building.locale_frame import LocaleFrame
 from world_models.entries import Obstacle
 
 CARTON = """units = "feet"
@@ -70,14 +69,3 @@ def test_a_carton_that_the_camera_misses_is_touched_once_and_driven_round(tmp_pa
     assert len(found) == 1
     assert found[0].value.locale == "north-hall" and found[0].value.x_m == pytest.approx((14 - 0.7) * 0.3048, abs=0.05)
     assert found[0].because[0].id.startswith("Contact-")
-
-
-def test_an_obstacle_of_which_the_robot_is_told_that_it_is_gone_is_forgotten(tmp_path: Path) -> None:
-    (tmp_path / "carton.toml").write_text(CARTON, encoding="utf-8")
-    told = '[[told]]\nat_s = 30.0\nwhat = "north-hall/obstacle-1"\nstate = "gone"\n'
-    decisions: list[Decision] = []
-    stage = build_stage(parse_scenario(MISSION + told, "carton", tmp_path))
-    result = run_mission(stage, 1, sources=without_floor_watcher, sinks=[decisions.append])
-    frames = [change.entry for d in decisions for change in d.made if isinstance(change.entry.value, LocaleFrame)]
-    assert result.outcome == "reached"
-    assert [len(frame.value.changes) for frame in frames] == [1, 0]

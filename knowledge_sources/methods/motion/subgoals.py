@@ -199,7 +199,7 @@ class SubgoalPlanner:
     def _find_free_passage(self, rooms: tuple[str, str], margin_m: float) -> Geometry:
         """Where the robot's centre may be in two rooms and their doorways, with a margin round the robot."""
         found = tuple(obstacle.footprint for obstacle in self._obstacles if obstacle.locale in rooms)
-        key = (rooms, margin_m, found)
+        key = (rooms, self._robot.radius_m + margin_m, found)
         return self._building.cached("free passages", MAX_FREE_PASSAGES, key, lambda: shapely.buffer(
             shapely.difference(find_floor(self._building, rooms), shapely.union_all([*map(build_polygon, found)])),
             -self._robot.radius_m - margin_m - JOINT_M))

@@ -108,4 +108,6 @@ def test_what_is_too_short_to_have_a_size_takes_none_away(sized: list[tuple[floa
     weights = [sigma**-2 for _, sigma in sized]
     mean = math.fsum(w * off for w, (off, _) in zip(weights, sized, strict=True)) / (math.fsum(weights) or 1.0)
     assert wheels.off == pytest.approx(mean) and wheels.what == told[0].what
-    assert wheels.sigma >= math.fsum(weights) ** -0.5 - 1e-12 if sized else wheels.sigma == 0.0
+    chi2 = math.fsum(w * (off - mean) ** 2 for w, (off, _) in zip(weights, sized, strict=True))
+    scatter = max(1.0, chi2 / (len(sized) - 1)) if len(sized) > 1 else 1.0  # no surer than how far apart they are
+    assert wheels.sigma == pytest.approx(math.sqrt(scatter / math.fsum(weights)) if sized else 0.0)

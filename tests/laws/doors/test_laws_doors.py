@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 from dataclasses import replace
 
 import numpy as np
@@ -170,15 +169,6 @@ def look(ratios: list[tuple[float, float]], *, is_shut: bool = False) -> list[Do
     return states
 
 
-def test_two_pictures_shut_a_door_and_a_few_open_it_again() -> None:
-    shut = look([(4.5, 0.0), (4.5, 1.0)])
-    assert [s and s.state for s in shut] == ["unknown", "shut"]
-    again = look([(4.5, 0.0), (4.5, 1.0), (-4.5, 2.0), (-4.5, 3.0)])
-    assert [s and s.state for s in again] == ["unknown", "shut", "shut", "open"]
-    told = look([(-4.5, 0.0), (-4.5, 1.0)], is_shut=True)
-    assert told[-1] is not None and told[-1].state == "open"
-
-
 def test_a_state_says_what_is_seen() -> None:
     state = look([(4.5, 0.0), (4.5, 1.0)])[-1]
     assert state is not None and not state.is_passable
@@ -221,41 +211,6 @@ def test_what_a_rival_explains_better_says_nothing(off: float) -> None:
 def see(known: DoorState | None, ratio: float, x_m: float, heading_rad: float = 0.0) -> DoorState | None:
     shown = replace(picture(ratio, x_m), heading_rad=heading_rad)
     return update_door(known, "d", ("a", "b"), shown, 1.0, is_believed_shut=False) or known
-
-
-@given(st.floats(2.0, 4.5), st.lists(st.floats(-3.0, 3.0), min_size=1, max_size=6))
-def test_however_it_turns_at_one_place_a_door_is_seen_once(ratio: float, turns: list[float]) -> None:
-    first = known = see(None, ratio, 0.0)
-    for turn in turns:
-        known = see(known, ratio, 0.0, turn)
-    assert known == first
-
-
-apart = st.lists(st.tuples(st.floats(2.0, 4.5), st.integers(0, 9)), min_size=1, max_size=4, unique_by=lambda at: at[1])
-
-
-@given(apart, st.randoms(use_true_random=False))
-def test_the_order_of_pictures_that_agree_does_not_matter(
-    looks: list[tuple[float, int]], chance: random.Random
-) -> None:
-    def end(order: list[tuple[float, int]]) -> float:
-        known: DoorState | None = None
-        for ratio, place in order:
-            known = see(known, ratio, 0.7 * place)
-        assert known is not None
-        return known.log_odds
-
-    shuffled = list(looks)
-    chance.shuffle(shuffled)
-    assert end(shuffled) == pytest.approx(end(looks))
-
-
-@given(st.floats(2.0, 4.5), st.floats(-4.5, -2.0))
-def test_a_picture_that_contradicts_what_was_seen_from_there_takes_its_place(shut: float, opened: float) -> None:
-    known = see(see(None, shut, 0.0), opened, 0.1)
-    alone = see(None, opened, 0.1)
-    assert known is not None and alone is not None
-    assert (known.log_odds, known.pictures) == (alone.log_odds, alone.pictures)
 
 
 @given(st.floats(0.0, 0.6), st.floats(2.0, 4.5))

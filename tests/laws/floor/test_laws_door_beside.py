@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from knowledge_sources.methods.floor import build_polygon
-from knowledge_sources.methods.floor.rivals_on_floor import MAX_BESIDE_M, find_jamb_beside
+from knowledge_sources.methods.floor.rivals_on_floor import MAX_BESIDE_M, MIN_JAMB_SIGMA_M, find_jamb_beside
 from world_models.building.changes import find_along, outline_door
 from world_models.building.locale_frame import FrameChange
 from world_models.building.locales import Doorway
@@ -52,6 +55,8 @@ def test_what_is_seen_of_a_jamb_is_that_end_of_the_wall(
     jamb = door.threshold_of(room)[side]
     opening = shapely.MultiPoint(np.concatenate(door.thresholds_world)).convex_hull.buffer(0.02)
     assert opening.contains(found.shape)
+    spread_m = math.hypot(MIN_JAMB_SIGMA_M, 0.25 * door.depth_m)  # on which side of its wall it is seen is not known
+    assert found.sigma_m == pytest.approx(spread_m, abs=1e-3)
     inward = (door.threshold_of(room)[1 - side] - jamb) / door.width_m
     into_m = (shapely.get_coordinates(found.shape) - jamb) @ inward
     assert into_m.min() >= -0.02 and into_m.max() <= MAX_BESIDE_M + 0.02

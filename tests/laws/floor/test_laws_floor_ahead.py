@@ -22,6 +22,7 @@ from knowledge_sources.reads.floor_ahead import (
     LOOK_FROM_M,
     MAX_DRIVEN_GAP_M,
     PUT_DOWN_FREE_M,
+    _find_scans,
     _find_way_beyond,
     list_free_discs,
 )
@@ -35,9 +36,11 @@ from world_models.entries import (
     Hypothesis,
     Impasse,
     Leg,
+    MotionReport,
     MotorCommand,
     Place,
     PlaceSearch,
+    RideReport,
     Subgoal,
 )
 from world_models.entries.floor import FloorSense
@@ -247,3 +250,20 @@ def test_before_a_door_that_may_be_shut_it_stops_for_a_picture_then_to_look_from
     assert (ROBOT.actuator.reach * far.move_m < 1.0 - LOOK_BEFORE_M + 0.06) == stops
     bench.put(Impasse("blocked", "it may be shut", behind=(state.id,), is_open=False))
     assert (go(1.0) == far) and (again := go(LOOK_BEFORE_M)) is not None and again.move_m > LOOK_BEFORE_M
+
+
+AGE_S = DEFAULT.action.max_seen_age_s
+
+
+@pytest.mark.parametrize(("ago_s", "ride_ago_s", "counts"), [
+    (AGE_S - SMALL, None, True), (AGE_S + SMALL, None, False), (1.0, 1.0 + SMALL, True), (1.0, 1.0 - SMALL, False)])
+def test_what_was_seen_tells_of_the_floor_until_it_is_old_or_the_robot_rides(
+    ago_s: float, ride_ago_s: float | None, counts: bool
+) -> None:
+    bench, now_s = Bench(ROBOT), 100.0
+    scan, belief = see(bench, 2.0, 2.0), bench.believe()
+    scan = bench.revise(scan, seen_s=now_s - ago_s)
+    if ride_ago_s is not None:
+        bench.put(RideReport("lift", HALL, 1.0, now_s - ride_ago_s))
+    bench.put(MotionReport(0.0, 0.1, 1.0, now_s))
+    assert _find_scans(bench.view, belief, DEFAULT.action) == ((scan,) if counts else ())

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from generated_boards import to_world
 from harvey.testing import HALL, house, plain_robot
-from knowledge_sources.methods.floor import MIN_OBSTACLE_CERTAINTY, Sight, build_polygon, see_ranges, touch_again
+from knowledge_sources.methods.floor import Sight, build_polygon, see_ranges, touch_again
 from knowledge_sources.methods.floor.footprints import ThingShape, find_same
 from knowledge_sources.methods.floor.ranges import RANGE_SLACK_M
 from knowledge_sources.methods.floor.rivals_on_floor import ShownSight
@@ -112,21 +112,6 @@ def test_of_two_sights_the_sharper_tells_place_and_height(sigma_m: float, sigma_
     is_higher = sigma_height_m < 0.7 * THING.sigma_height_m
     assert (new.height_m, new.sigma_height_m) == ((0.7, sigma_height_m) if is_higher else (
         THING.height_m, THING.sigma_height_m))
-
-
-@pytest.mark.parametrize("p", [0.3, 0.6, 0.95])
-@pytest.mark.parametrize("way_m", [0.0, 20.0])
-@pytest.mark.parametrize("status", ["suspected", "there"])
-def test_only_from_elsewhere_it_is_further_evidence(p: float, way_m: float, status: str) -> None:
-    """There the odds multiply; from the same place the stronger counts."""
-    known = replace(THING, status=status, certainty=0.55)
-    new = look(p=p, way_m=way_m, known=known)
-    assert new is not None
-    odds = 0.55 / 0.45 * p / (1.0 - p)
-    wanted = odds / (1.0 + odds) if way_m else max(p, 0.55)
-    assert new.certainty == pytest.approx(min(wanted, DEFAULT.action.max_obstacle_certainty), abs=0.02)
-    is_there = status == "there" or new.certainty >= MIN_OBSTACLE_CERTAINTY
-    assert new.status == ("gone" if new.certainty < 0.5 else "there" if is_there else "suspected")
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -58,15 +58,6 @@ def test_one_sure_picture_makes_an_obstacle_and_says_which_pixels(hall: Hall) ->
     assert (change.what, change.name) == ("extra", found.name) and change.height_m == pytest.approx(0.45)
 
 
-def test_an_unsure_picture_makes_a_suspicion_and_a_second_one_an_obstacle(hall: Hall) -> None:
-    hall.see(carton(0.8), seen_s=1.0)
-    assert [o.status for o in hall.obstacles] == ["suspected"] and not hall.frame.changes
-    hall.see(carton(0.8), seen_s=1.03, ahead_m=0.02)  # a picture from the same place tells nothing new
-    assert [o.status for o in hall.obstacles] == ["suspected"] and not hall.frame.changes
-    hall.see(carton(0.8), seen_s=3.0, ahead_m=0.3)
-    assert [o.status for o in hall.obstacles] == ["there"] and len(hall.frame.changes) == 1
-
-
 def test_what_is_seen_again_is_one_obstacle_and_the_frame_stays(hall: Hall) -> None:
     hall.see(carton(), seen_s=1.0)
     before = hall.frame
@@ -86,13 +77,6 @@ def test_what_is_seen_free_is_forgotten_within_two_pictures_and_found_again(hall
     assert hall.frame.changes == () and "is gone" in hall.obstacles[0].sentence()
     hall.see(carton(), seen_s=5.0)
     assert [o.status for o in hall.obstacles] == ["gone", "there"] and len(hall.frame.changes) == 1
-
-
-def test_floor_that_is_not_seen_does_not_make_an_obstacle_gone(hall: Hall) -> None:
-    hall.see(carton(), seen_s=1.0)
-    for step in range(5):
-        hall.see(seen_s=2.0 + step, far_m=1.9)  # the carton stands beyond
-    assert [o.status for o in hall.obstacles] == ["there"]
 
 
 def test_what_was_touched_is_forgotten_when_its_floor_is_clearly_free(hall: Hall) -> None:
@@ -124,23 +108,6 @@ def test_what_the_model_has_there_is_no_obstacle(hall: Hall) -> None:
     skirting = FloorThing(strip, 0.03, 0.1, math.inf, 0.99, (0.0, 0.0, 9.0, 9.0), "unlike the floor")
     hall.see(skirting, seen_s=1.0)
     assert hall.obstacles == []
-
-
-def test_what_was_seen_since_the_last_sure_place_moves_with_the_belief(hall: Hall) -> None:
-    """And nothing is forgotten: a thing that was certain is in the frame still, where it was seen from the robot."""
-    hall.verify()
-    hall.see(carton(), seen_s=1.0)
-    hall.verify()
-    hall.see(carton(), carton(by_m=-0.7), seen_s=2.0)
-    hall.verify("refuted")
-    hall.find("milestone")
-    before = hall.obstacles
-    hall.find("relocalization", Pose2(0.05, 0.02, 0.0))
-    first, second = hall.obstacles
-    assert first == before[0]
-    assert np.array(second.footprint) == pytest.approx(np.array(before[1].footprint) + np.array([0.05, 0.02]), abs=2e-3)
-    assert [o.status for o in hall.obstacles] == ["there", "there"]
-    assert len(hall.frame.changes) == 2 and "moved with the belief" in second.evidence
 
 
 def test_without_what_was_found_the_building_is_as_before_and_what_is_known_of_both_is_kept(hall: Hall) -> None:

@@ -17,7 +17,7 @@ from knowledge_sources.methods.motion import CLEARANCES_M
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
 from knowledge_sources.model.dependency_withdrawer import DependencyWithdrawer
 from world_models.building.locale_frame import FrameChange, LocaleFrame
-from world_models.entries import Milestone, Obstacle, Place, PlanSketch, Subgoal, Track, Tracks
+from world_models.entries import Milestone, Obstacle, Place, PlanSketch, Subgoal, Track, Tracks, UserReport
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2
 
@@ -151,7 +151,9 @@ def test_where_the_robot_touches_it_now_the_way_is_blocked_wherever_it_leads(
 
 @pytest.mark.parametrize("passage", ["study-door", "other-door"])
 @pytest.mark.parametrize("at", [0, 1])
-def test_a_way_through_a_door_that_was_found_shut_is_drawn_anew(passage: str, at: int) -> None:
+@pytest.mark.parametrize("is_found", [False, True])
+def test_a_way_through_a_door_that_was_found_shut_is_drawn_anew(passage: str, at: int, is_found: bool) -> None:
+    """Also where a thing that is not on the way comes into the frame at once."""
     bench = Bench(plain_robot())
     bench.believe()
     goal = bench.pursue(Place(STUDY, 3.0, 2.0))
@@ -160,7 +162,12 @@ def test_a_way_through_a_door_that_was_found_shut_is_drawn_anew(passage: str, at
     sketches = [bench.put(PlanSketch(goal.id, path, "", steps, at)) for path in ((), (0,))]
     done = bench.put(PlanSketch(goal.id, (), "", steps, 0, status="done"))
     shut = (FrameChange("shut", "study-door", "test"),)
-    effects = bench.ask(DependencyWithdrawer(), bench.revise(bench.frame(), changes=shut))
+    far = to_world(Pose2(0.6, 3.6, 0.0)).position
+    box = tuple((float(far[0] + x), float(far[1] + y)) for x, y in ((0.0, 0.0), (0.1, 0.0), (0.0, 0.1)))
+    thing = Obstacle("hall/obstacle-1", HALL, box, 0.02, 0.6, 3.6, 0.1)
+    told, frame = [bench.put(said) for said in (UserReport("study-door", "shut"), thing)[:1 + is_found]], bench.frame()
+    (revised,) = bench.apply(Revise(frame, replace(frame.value, changes=shut), (frame, *told)))
+    effects = bench.ask(DependencyWithdrawer(), revised.entry)
     misled = passage == "study-door" and at == 0
     ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
     assert ids == ({sketch.id for sketch in sketches} if misled else set()) and done.id not in ids

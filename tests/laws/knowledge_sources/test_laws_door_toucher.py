@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, precondition, rule
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
 from blackboard import Entry
 from generated_boards import LENGTH_M, WIDTH_M, Bench, effect_on, reasons
@@ -93,18 +93,30 @@ def test_it_keeps_the_laws_of_all_sources() -> None:
     check_source(SOURCE, bench, bench.view["Hypothesis-1"], without=(known.id, "Contact-1"))
 
 
+frames = st.builds(Pose2, st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-3.0, 3.0))
+
+
 class DoorMachine(RuleBasedStateMachine):
-    """Pictures from three places far apart and one touch, in any order, against plain odds."""
+    """Pictures from three places far apart and one touch, in any order and direction, against plain odds.
+
+    Wherever the building stands, whatever was believed of the door, and however the robot turns at a place.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.known: DoorState | None = None
         self.views, self.is_touched, self.was_shut = dict[int, float](), False, False
 
-    @rule(place=st.integers(0, 2), ratio=st.floats(-7.0, 7.0) | st.sampled_from((3.0, 6.0)))
-    def see(self, place: int, ratio: float) -> None:
-        picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), 9.0 * place, 0.0, 0.0, ratio, "a leaf")
-        now = update_door(self.known, "study-door", (HALL, STUDY), picture, 1.0, is_believed_shut=False)
+    @initialize(frame=frames, is_believed_shut=st.booleans())
+    def begin(self, frame: Pose2, is_believed_shut: bool) -> None:
+        self.frame, self.is_believed_shut = frame, is_believed_shut
+
+    @rule(place=st.integers(0, 2), turn_rad=st.floats(-3.0, 3.0),
+          ratio=st.floats(-7.0, 7.0) | st.sampled_from((3.0, 6.0)))
+    def see(self, place: int, turn_rad: float, ratio: float) -> None:
+        at = self.frame @ Pose2(9.0 * place, 0.0, turn_rad)
+        picture = DoorPicture("CameraPicture-1", (0.0, 0.0, 9.0, 9.0), at.x_m, at.y_m, at.heading_rad, ratio, "a leaf")
+        now = update_door(self.known, "study-door", (HALL, STUDY), picture, 1.0, is_believed_shut=self.is_believed_shut)
         old = self.views.get(place, 0.0)
         if abs(ratio) < MIN_LOG_RATIO or (old * ratio > 0.0 and abs(old) >= abs(ratio)):
             assert now is None  # it is too little, or was said already
@@ -116,7 +128,7 @@ class DoorMachine(RuleBasedStateMachine):
         self.views, self.known = views, now
         self.agree()
 
-    @precondition(lambda self: self.known is not None and not self.is_touched)
+    @precondition(lambda self: self.known is not None and self.known.may_be_shut and not self.is_touched)
     @rule()
     def touch(self) -> None:
         assert self.known is not None
@@ -126,7 +138,8 @@ class DoorMachine(RuleBasedStateMachine):
         self.name_state()
 
     def odds(self, views: dict[int, float]) -> float:
-        told = -PRIOR_LOG_ODDS + math.fsum(views.values()) + TOUCH_LOG_RATIO * self.is_touched
+        prior = PRIOR_LOG_ODDS if self.is_believed_shut else -PRIOR_LOG_ODDS
+        told = prior + math.fsum(views.values()) + TOUCH_LOG_RATIO * self.is_touched
         return min(max(told, -MAX_LOG_ODDS), MAX_LOG_ODDS)
 
     def agree(self) -> None:
@@ -136,12 +149,14 @@ class DoorMachine(RuleBasedStateMachine):
         self.name_state()
 
     def name_state(self) -> None:
-        """Two that tell so shut it; what shut it once is held until it is open."""
+        """Two that tell so shut it; what shut it once is held until it is open. As certain as it is likely."""
         assert self.known is not None
         enough = len(self.views) + self.is_touched >= MIN_PICTURES
         is_shut = self.known.log_odds >= SHUT_LOG_ODDS and enough
         is_open = self.known.log_odds <= OPEN_LOG_ODDS
         self.was_shut = is_shut or (self.was_shut and not is_open)
+        sign = -1.0 if is_open else 1.0
+        assert self.known.certainty == pytest.approx(1.0 / (1.0 + math.exp(-sign * self.known.log_odds)))
         assert self.known.state == ("open" if is_open else "shut" if self.was_shut else "unknown")
 
 

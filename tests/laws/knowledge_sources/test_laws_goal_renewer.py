@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blackboard import Entry, Level, Post, Revise
+from blackboard import Level, Post, Revise
 from generated_boards import (
-    WIDTH_M,
     Bench,
     all_reasons,
     effect_on,
     made,
-    mirrored,
-    mirrored_place,
     poses,
     reasons,
 )
@@ -78,20 +74,3 @@ def test_it_keeps_the_laws_of_all_sources() -> None:
     bench.pursue(TO)
     bench.doubt()
     check_source(SOURCE, bench, bench.revise(bench.believe(), basis="relocalization"))
-
-
-@given(poses)
-@settings(max_examples=10)
-def test_mirrored_it_begins_at_the_mirrored_place(pose: Pose2) -> None:
-    def board(here: Pose2, to: Place) -> tuple[Bench, Entry[Any]]:
-        bench = Bench(plain_robot())
-        bench.pursue(to)
-        bench.doubt()
-        return bench, bench.revise(bench.believe(), locale_from_robot=here, basis="relocalization")
-
-    def turn(value: Any) -> Any:
-        return value if not isinstance(value, Goal) else value if value.status == "abandoned" else replace(
-            value, origin=mirrored_place(value.origin))
-
-    to = Place(HALL, 6.0, 0.5 * WIDTH_M)  # in the middle of the mirror
-    check_source(SOURCE, *board(pose, to), alike=[(*board(mirrored(pose), to), turn)])

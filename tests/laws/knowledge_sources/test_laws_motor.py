@@ -17,8 +17,6 @@ from generated_boards import (
     all_reasons,
     effect_on,
     made,
-    mirrored,
-    mirrored_place,
     near,
     poses,
     reasons,
@@ -194,29 +192,6 @@ def test_an_increment_leads_towards_the_line_ahead(pose: Pose2, bend: float | No
     named = {"Leg", "Hypothesis-1"} | ({drift.id} if drift is not None else set())
     assert reasons(effect_on(effects, MotorCommand)) == named
     assert reasons(effect_on(effects, Leg)) == {leg.id, "Hypothesis-1"}
-
-
-@settings(max_examples=60)
-@given(poses, st.floats(-0.03, 0.03), st.floats(1.0, 3.0), st.booleans())
-def test_turned_left_and_right_the_mirrored_board_gives_the_mirrored_command(
-    pose: Pose2, bend: float, y_m: float, is_blind: bool
-) -> None:
-    source, to = BLIND if is_blind else Motor(), Place(HALL, 6.5, y_m)
-    commands = []
-    for sign in (1, -1):
-        bench = Bench(plain_robot())
-        bench.believe(pose if sign > 0 else mirrored(pose))
-        sketch = bench.sketch(*((FROM, to) if sign > 0 else map(mirrored_place, (FROM, to))))
-        bench.put(Drift(sign * bend, 0.004, 0.0))
-        commands.append(command_of(bench.ask(source, bench.leg(sketch))))
-    one, other = commands
-    assert (one is None) == (other is None)
-    if one is not None and other is not None and abs(abs(one.turn_rad) - ACTUATOR.turn_increment_rad) > SMALL:
-        assert one.turn_rad == pytest.approx(-other.turn_rad, abs=1e-9)
-        # The floor is asked point by point of a grid in the world, which is not mirrored.
-        assert one.move_m == pytest.approx(other.move_m, abs=1e-9 if is_blind else 0.06)
-        speeds = [command.speed_m_per_s or ACTUATOR.speed_m_per_s for command in commands if command is not None]
-        assert speeds[0] == pytest.approx(speeds[1], abs=1e-9 if is_blind else 0.06)
 
 
 @pytest.mark.parametrize("magnitude", [1.0, 4.9])

@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from blackboard import Effect, Entry, Level, Revise, Revised
-from generated_boards import Bench, effect_on, made, mirrored, mirrored_place, reasons, to_world
+from generated_boards import Bench, effect_on, made, reasons, to_world
 from harvey.testing import HALL, check_source, house, plain_robot
 from knowledge_sources.action.path_follower import (
     MAX_ROLLING_ERROR_RAD,
@@ -187,17 +187,6 @@ def test_it_steers_an_arc_through_the_point_ahead_less_what_the_wheels_bend(
     assert leg.value.increments == (not rolls) and reasons(leg) == {board.leg.id, board.belief.id}
     assert (leg.value.to_go_m, leg.value.left_m) == (pytest.approx(TO.x_m - pose.x_m), pytest.approx(left, abs=1e-9))
     assert leg.value.aim_rad == pytest.approx(aside, abs=1e-9)
-
-
-@settings(max_examples=60)
-@given(near_line, st.floats(-0.03, 0.03), st.floats(1.9, 2.1))
-def test_the_mirrored_board_is_steered_the_other_way(pose: Pose2, bend: float, y_m: float) -> None:
-    way = (FROM, Place(HALL, 7.0, y_m))
-    one = Rolling(pose, bend=bend, way=way)
-    other = Rolling(mirrored(pose), bend=-bend, way=(mirrored_place(way[0]), mirrored_place(way[1])))
-    courses = [made(board.ask(), Course)[0] for board in (one, other)]
-    assert courses[0].curvature_per_m == pytest.approx(-courses[1].curvature_per_m, abs=1e-9)
-    assert courses[0].speed_m_per_s == courses[1].speed_m_per_s
 
 
 def test_a_difference_within_its_bound_is_corrected_by_the_next_course() -> None:

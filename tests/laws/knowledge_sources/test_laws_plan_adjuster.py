@@ -13,8 +13,6 @@ from generated_boards import (
     Bench,
     covariances,
     effect_on,
-    mirrored,
-    mirrored_covariance,
     poses,
     reasons,
     to_world,
@@ -65,23 +63,6 @@ def test_the_belief_is_the_pose_in_the_frame_of_its_locale_and_the_doubt_ends(
     assert end.entry.id == doubt.id and end.value == replace(doubt.value, status="corrected")
     bench.apply(*effects or ())
     assert bench.ask(SOURCE, certificate) is None
-
-
-@settings(max_examples=20)
-@given(poses)
-def test_mirrored_the_belief_is_mirrored(pose: Pose2) -> None:
-    found = []
-    for here, covariance in ((pose, SLANTED), (mirrored(pose), mirrored_covariance(SLANTED))):
-        bench = Bench(plain_robot())
-        bench.believe()
-        bench.doubt(Level.PLAN, 3.0)
-        certificate = certify(bench, fix_at(bench, here, covariance).id)
-        found.append(effect_on(bench.ask(SOURCE, certificate), Hypothesis).value)
-    one, other = found
-    back = mirrored(other.locale_from_robot)
-    assert (back.x_m, back.y_m, back.heading_rad) == pytest.approx(
-        (one.locale_from_robot.x_m, one.locale_from_robot.y_m, one.locale_from_robot.heading_rad), abs=1e-9)
-    assert np.allclose(one.covariance, mirrored_covariance(other.covariance), atol=1e-12)
 
 
 @pytest.mark.parametrize(("magnitude", "acts"), [(None, True), (29.999, True), (30.0, True), (30.001, False)])

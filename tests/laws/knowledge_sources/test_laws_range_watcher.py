@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from generated_boards import WIDTH_M, Bench, all_reasons, effect_on, made, mirrored, to_world
+from generated_boards import Bench, all_reasons, effect_on, made, to_world
 from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.methods.floor import see_ranges
 from knowledge_sources.model.range_watcher import (
@@ -87,20 +86,6 @@ def find_things(pose: Pose2, near: tuple[float | None, ...]) -> list[tuple[float
         own = hall_from_world @ Pose2(x_m, y_m, 0.0)
         found.append((own.x_m, own.y_m, thing.p_thing))
     return found
-
-
-@settings(max_examples=10)
-@given(st.floats(2.5, 5.5), st.floats(1.5, 2.5), st.sampled_from((0.0, math.pi)),
-       st.lists(st.none() | st.floats(0.5, 1.1), min_size=len(RING), max_size=len(RING)))
-def test_mirrored_echoes_tell_of_mirrored_things(
-    x: float, y: float, heading: float, near: list[float | None]
-) -> None:
-    pose = Pose2(x, y, heading)
-    one, other = find_things(pose, tuple(near)), find_things(mirrored(pose), tuple(reversed(near)))
-    back = [(x_m, WIDTH_M - y_m, p) for x_m, y_m, p in other]
-    assert len(one) == len(back)
-    for thing in one:  # corners are written to 0.1 mm
-        assert any(np.allclose(thing, there, atol=1e-3) for there in back)
 
 
 def test_a_thing_stands_on_the_side_on_which_it_was_heard() -> None:

@@ -12,12 +12,14 @@ from blackboard import Entry, Level, Revised
 from generated_boards import Bench, effect_on, made, reasons
 from harvey.testing import check_source
 from knowledge_sources.milestone.line_finder import LineFinder
+from knowledge_sources.model import shut_door_explainer
 from knowledge_sources.model.shut_door_explainer import (
     MAX_DOUBTED_SIGMA_M,
     MAX_DOUBTED_SIGMA_RAD,
     REFUTED_LOG_RATIO,
     ShutDoorExplainer,
 )
+from knowledge_sources.reads.doors_in_view import MAX_SIGMA_M, MAX_SIGMA_RAD
 from world_models.entries import CameraPicture, DoorState, Milestone, Segments, diagonal
 from world_models.frames import Pose2, flattened
 
@@ -72,6 +74,19 @@ def test_nor_is_one_that_is_not_where_the_robot_believes_it() -> None:
 def test_it_acts_only_where_the_place_is_known_so_well(sigma_m: float, sigma_rad: float, acts: bool) -> None:
     bench, milestone = refute(before_door(3.0, 0.0), is_shut=True, sigma_m=sigma_m, sigma_rad=sigma_rad)
     assert (SOURCE.find_case(bench.view, Revised(milestone)) is not None) is acts
+
+
+@pytest.mark.parametrize(("more_m", "more_rad", "sure"), [
+    (-1e-6, -1e-6, True), (1e-6, -1e-6, False), (-1e-6, 1e-6, False)])
+def test_few_lines_explain_only_where_place_and_heading_are_sure(
+    more_m: float, more_rad: float, sure: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To a few lines the picture leaves the place open: then it is the belief that must be sharp, each deviation."""
+    asked: list[bool] = []
+    monkeypatch.setattr(shut_door_explainer, "is_explained", lambda *_, is_sure: bool(asked.append(is_sure)))
+    bench, milestone = refute(before_door(3.0, 0.0), is_shut=True, sigma_m=MAX_SIGMA_M + more_m,
+                              sigma_rad=MAX_SIGMA_RAD + more_rad)
+    assert not bench.ask(SOURCE, milestone) and asked == [sure]
 
 
 def test_it_keeps_the_laws_of_all_sources() -> None:

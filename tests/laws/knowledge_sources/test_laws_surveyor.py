@@ -12,8 +12,17 @@ from generated_boards import Bench, effect_on, made, mirrored, reasons, to_world
 from harvey.testing import HALL, check_source, plain_robot
 from knowledge_sources.methods.belief import weigh_rivals
 from knowledge_sources.milestone_selector.view_predictor import ViewPredictor
+from knowledge_sources.model import surveyor
 from knowledge_sources.model.surveyor import Surveyor
-from world_models.entries import Certificate, Evidence, LineMatch, Milestone, PoseFix, Segments, diagonal
+from world_models.entries import (
+    Certificate,
+    Evidence,
+    LineMatch,
+    Milestone,
+    PoseFix,
+    Segments,
+    diagonal,
+)
 from world_models.frames import Pose2
 
 SOURCE, ROBOT, HERE, THERE = Surveyor(), plain_robot(), Pose2(2.0, 1.8, 0.05), Pose2(3.5, 2.2, -0.1)
@@ -67,6 +76,12 @@ def test_what_stands_beside_is_told_and_looks_add_up(case: tuple[str, float, flo
 @given(st.sampled_from((HERE, THERE, mirrored(HERE))), st.integers(0, 99), st.floats(-0.01, 0.01))
 def test_of_a_building_as_it_was_measured_nothing_is_told(pose: Pose2, seed: int, by_m: float) -> None:
     assert not made(Bench.ask((seen := look(by_m, by_m, pose, seed=seed))[0], SOURCE, seen[1]), Evidence)
+
+
+def test_what_all_pictures_share_makes_each_less_sure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(surveyor, "SHARED_SIGMA_M", 1.0)
+    (wider,) = tell(WIDTH, look(0.1))
+    assert wider.explanations[1].sigma >= 1.0 and not tell(DOOR, look(0.0, 0.1))  # of a door not sure enough
 
 
 def test_a_door_is_told_by_a_sure_place_alone() -> None:

@@ -156,6 +156,15 @@ def test_the_way_goes_on_by_the_turned_headings_until_it_is_spent(off: float, le
     assert np.allclose((travel.x_m, travel.y_m), (length_m * math.cos(0.7 - step), length_m * math.sin(0.7 - step)))
 
 
+@pytest.mark.parametrize("part", [0.5, 0.9, 4.0])
+def test_no_yaw_is_known_better_than_a_camera_can_be(part: float) -> None:
+    camera, least = come(0.0, 9.0, variance=part * LEAST_SIGMA_RAD**2).camera, LEAST_SIGMA_RAD**2
+    assert camera is not None
+    gain = part * least / (part * least + compute_noise(9.0, 0.0))
+    assert camera.covariance[YAW][YAW] == pytest.approx(max((1.0 - gain) * part * least, least))
+
+
+
 def test_what_is_told_rests_on_the_way_and_where_it_ended() -> None:
     way = come(0.01)
     named = {kind.__name__: reasons(effect_on(way.effects, kind)) for kind in (CameraState, Hypothesis, Drift)}

@@ -18,7 +18,6 @@ from knowledge_sources.methods.localization import (
     LocalizationStatus,
     are_distinct,
     get_visibility_map,
-    propagate_pose,
     refinement,
 )
 from knowledge_sources.methods.localization.global_localization import find_aliases, localize
@@ -168,21 +167,6 @@ def test_a_sensing_move_is_collision_free_from_every_hypothesis(seed: int) -> No
 
 
 # -- views related by motions ----------------------------------------------------------------------------------------
-
-
-@settings(deadline=None, max_examples=40)
-@given(steps=st.lists(st.tuples(angles, st.floats(0, 1)), min_size=1, max_size=5), start=poses)
-def test_earlier_poses_are_propagated_as_the_robot_moved(steps: list[tuple[float, float]], start: Pose2) -> None:
-    actuator, now, then, spread = ActuatorModel(), start, HERE, np.zeros((3, 3))
-    for turn, way in steps:
-        step = actuator.predict_motion(turn, way)
-        now = now @ step
-        before = np.trace(spread)
-        then, spread = propagate_pose(then, spread, step, actuator.motion_covariance(turn, way))
-        assert np.linalg.eigvalsh(spread)[0] >= -1e-12 and np.trace(spread) >= before - 1e-9
-    back = now @ then
-    assert back.distance_to(start) < 1e-9
-    assert abs(wrap_angle(back.heading_rad - start.heading_rad)) < 1e-9
 
 
 @settings(deadline=None, max_examples=40)

@@ -74,10 +74,11 @@ def test_the_prior_alone_is_not_believed_where_the_pictures_speak_for_another(tw
         assert odds[0] < MIN_P_BELIEVED
 
 
-@given(st.floats(3.0, 30.0))
-def test_between_places_alike_by_the_model_only_so_much_is_no_chance(log: float) -> None:
-    odds = compute_place_odds([log, 0.0], [True, False], [True, True], P_STATED)
-    most = P_STATED / (1.0 - P_STATED) * math.exp(MAX_ALIKE_LOG_RATIO)
+@given(st.floats(3.0, 30.0), st.sampled_from((-1.0, 1.0)))
+def test_between_places_alike_by_the_model_only_so_much_is_no_chance(log: float, side: float) -> None:
+    """For the told one as against it."""
+    odds = compute_place_odds([side * log, 0.0], [True, False], [True, True], P_STATED)
+    most = P_STATED / (1.0 - P_STATED) * math.exp(side * MAX_ALIKE_LOG_RATIO)
     assert odds[0] / odds[1] == pytest.approx(most)
 
 

@@ -135,27 +135,14 @@ def test_a_pose_behind_the_camera_is_never_returned(solver: Solver, scene: PoseS
     assert found.ok or found.reason
 
 
-@given(scene=scenes, count=st.integers(0, 3), seed=seeds)
-@settings(max_examples=25, deadline=None)
-def test_few_lines_never_make_a_prior_worse(scene: PoseScene, count: int, seed: int) -> None:
-    """Errors are measured by the information of a weak prior; the lines are exact."""
-    rng = np.random.default_rng(seed)
-    scene = take_some(scene, rng, count)
-    truth = scene.camera_from_world
-    prior = draw_prior(truth, 0.1, 0.01, rng)
-    for solver in (r_and_t_ml, *ROBUST):
-        found = solve(solver, scene, scene.segments_px, prior)
-        assert weigh_error(found.camera_from_world, truth) <= weigh_error(prior, truth) * 1.02 + 1e-6
-
-
-@pytest.mark.parametrize("count", [1, 2, 3])
-@given(scene=scenes, seed=seeds)
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+@given(scene=scenes, seed=seeds, sigma_px=st.sampled_from((0.0, SIGMA_PX)))
 @settings(max_examples=25, deadline=None, derandomize=True)
-def test_few_noisy_lines_never_make_a_prior_worse(count: int, scene: PoseScene, seed: int) -> None:
-    """Their noise does not move the pose far in directions of which they say little."""
+def test_few_lines_never_make_a_prior_worse(count: int, scene: PoseScene, seed: int, sigma_px: float) -> None:
+    """By the information of a weak prior: noise does not move the pose far in directions of which they say little."""
     rng = np.random.default_rng(seed)
     scene = take_some(scene, rng, count)
-    truth, segments = scene.camera_from_world, end_noise(scene.segments_px, SIGMA_PX, rng)
+    truth, segments = scene.camera_from_world, end_noise(scene.segments_px, sigma_px, rng)
     prior = draw_prior(truth, 0.1, 0.01, rng)
     for solver in (r_and_t_ml, *ROBUST):
         found = solve(solver, scene, segments, prior)

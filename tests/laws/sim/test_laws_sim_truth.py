@@ -117,14 +117,6 @@ def test_what_comes_and_goes_is_there_while_it_lasts(at_s: float, lasts_s: float
         body.wait(0.2)
 
 
-def test_a_door_that_opens_again_is_as_if_it_had_never_been_shut() -> None:
-    stage = stage_of(f'{DOOR}state = "shut"\nuntil_s = 2.0\n')
-    body, before = stage.body(0), stage.building
-    body.wait(3.0)
-    assert before.added and not body.building.added
-    np.testing.assert_array_equal(see(body.building, stage.goal_world), see(stage_of("").building, stage.goal_world))
-
-
 def test_on_another_floor_what_differs_there_is_there_too() -> None:
     scenario = load_scenario("elevator-ride")
     box = '[[truth.extra]]\nkind = "box"\nlocale = "first-hallway"\nx_ft = 20\ny_ft = 4\nat_s = 5\n'
@@ -137,14 +129,6 @@ def test_on_another_floor_what_differs_there_is_there_too() -> None:
     assert body.building.obstacles.clearance_m(there) > 0.0
     assert isinstance(body.ride(Ride("PlanSketch-1", 0, link.name, up, down)), RideReport)
     assert body.building.floor_m == world.floor_m(down) and body.building.obstacles.clearance_m(there) < 0.0
-
-
-def test_the_last_entry_about_a_door_holds() -> None:
-    stage = stage_of(f'{DOOR}state = "shut"\n{DOOR}state = "open"\nat_s = 2.0\n')
-    body = stage.body(0)
-    assert body.building.added
-    body.wait(2.0)
-    assert not body.building.added
 
 
 def test_what_would_come_to_where_the_robot_stands_waits_until_it_has_gone() -> None:

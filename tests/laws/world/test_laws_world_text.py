@@ -103,15 +103,6 @@ def test_any_text_gives_a_world_error(text: str) -> None:
     assert read(text) is None
 
 
-@settings(deadline=None, max_examples=60)
-@given(st.binary(max_size=40))
-def test_any_bytes_give_a_world_error(data: bytes) -> None:
-    try:
-        Source.parse(data.decode("utf-8", "replace"), "bytes")
-    except WorldError:
-        return
-
-
 keys = st.text("ab-", min_size=1, max_size=3)
 scalars = st.one_of(st.integers(), st.booleans(), st.sampled_from(['x"y', "a#b", "[", "}", "'", "=,"]))
 

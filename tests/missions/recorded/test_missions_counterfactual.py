@@ -67,13 +67,6 @@ def test_a_setting_set_to_its_default_changes_nothing(run: RunDirectory, name: s
     assert (answer.then, answer.now, answer.outcome.kind) == (None, None, "reached")
 
 
-@pytest.mark.parametrize(("name", "value"), [
-    ("plan.max_leg_m", "1.5"), ("action.creep_speed_m_per_s", "0.05")])
-def test_a_setting_of_any_room_changes_decisions(run: RunDirectory, name: str, value: str) -> None:
-    answer = what_if(run, (), [(name, value)], go_on=False)
-    assert answer.now is not None and answer.agreed < len(list(Timeline(run.journal).decisions()))
-
-
 def test_a_run_with_other_settings_is_decided_again_with_them(
     short_stage: Stage, run: RunDirectory, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

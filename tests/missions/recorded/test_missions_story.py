@@ -11,24 +11,17 @@ from pathlib import Path
 
 import pytest
 
-from blackboard import decision_line
 from docs.tools.moments import moments_of
-from harvey.agent import build_agent
 from harvey.campaign.mission_task import Task, run_task
 from harvey.cli import main
-from harvey.runner.replay import replay
 from headless_viewer import look_or_skip
 from logs.explain.story import RunStory, story_lines, tell_run
 from logs.explain.true_errors import read_errors
 from logs.explain.turning_points import read_turning_points
-from logs.pictures import open_pictures
 from logs.reader import read_series
 from logs.recording.paths import POSITION
-from logs.records import Originals, decision_of
 from logs.run_directory import RunDirectory
-from logs.run_head import RunHead
 from logs.timeline import Timeline
-from memory_timeline import MemoryTimeline
 from recorded_runs import BUMP, Recorded
 from world_models.entries import Certificate, Contact
 
@@ -139,15 +132,6 @@ def test_each_contact_is_told_with_its_cycle(told: tuple[str, Path], story: RunS
     assert all(re.search(r"\(-?[0-9.]+, -?[0-9.]+\) m", s.text) for s in section.steps if s.cycle is not None)
 
 
-def test_the_story_of_a_replayed_run_is_the_same(told: tuple[str, Path], story: RunStory) -> None:
-    run = RunDirectory(told[1])
-    agent = build_agent(RunHead.read(run.path))
-    again = replay(run, Originals(open_pictures(run), agent.store), agent.scheduler())
-    decided = [decision.now for decision in again]
-    lines = [json.loads(decision_line(now)) for now in decided if now is not None]
-    assert tell_run(run, MemoryTimeline(map(decision_of, lines))) == story
-
-
 def test_as_json_it_is_whole(told: tuple[str, Path], story: RunStory, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["story", str(told[1]), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(asdict(story)))
@@ -159,20 +143,6 @@ def test_what_it_says_of_the_truth_comes_from_the_result_alone(told: tuple[str, 
     run.result.unlink()
     page = "\n".join(story_lines(tell_run(run, Timeline(run.journal))))
     assert "In truth" not in page and "collision" not in page and "there is no result of the simulator" in page
-
-
-def test_a_run_that_was_cut_off_is_told_and_is_one_error(
-    told: tuple[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run = RunDirectory(tmp_path / "run")
-    run.path.mkdir()
-    lines = (told[1] / "journal.jsonl").read_bytes().splitlines(keepends=True)
-    whole = len(lines) // 2
-    run.journal.write_bytes(b"".join(lines[:whole]) + lines[whole][:30])
-    assert main(["story", str(run.path)]) == 2
-    printed = capsys.readouterr()
-    assert printed.out.startswith(f"run: cut off in cycle {whole}") and "\nMilestones\n" in printed.out
-    assert len(printed.err.splitlines()) == 1 and f"was cut off in cycle {whole}" in printed.err
 
 
 def test_how_far_off_it_was_is_what_the_recording_has_drawn(told: tuple[str, Path], history: Timeline) -> None:

@@ -14,7 +14,6 @@ from harvey.cli import main
 from harvey.replay.why_not_again import Fate, in_cycle, in_run
 from logs.explain.model import WorldFile
 from logs.explain.phrases import Sentence, Story, describe_decision
-from logs.explain.web import check
 from logs.explain.why import lines_of, story
 from logs.run_directory import RunDirectory
 from logs.run_head import RunHead
@@ -134,12 +133,6 @@ def test_a_sketch_drawn_anew_goes_back_to_what_was_told(run: RunDirectory, histo
         assert f"{DOOR} is shut (user)" in step(found, "changed").text
         assert step(found, "told").refs == ("UserReport-1.0",)
     assert main(["why", str(run.path)]) == 0
-
-
-def test_every_line_of_every_explanation_ends_in_goal_model_or_sensor(history: Timeline) -> None:
-    found = check(history)
-    assert found.reached == found.decisions > 100
-    assert found.by_kind["model"] > 100
 
 
 def test_a_door_a_landmark_and_a_room_are_answered_by_name(

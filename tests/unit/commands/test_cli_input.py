@@ -100,10 +100,6 @@ def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: 
     assert told in err
 
 
-def test_a_scenario_that_is_not_there_is_named_before_anything_begins(capsys: pytest.CaptureFixture[str]) -> None:
-    assert said(capsys, ["run", "nosuch"])[1].startswith("harvey: scenario: expected one of")
-
-
 def test_a_port_in_use_is_named_before_a_base_is_there(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = str(taken.getsockname()[1])

@@ -159,8 +159,3 @@ def test_the_questions_that_are_named_are_understood(question: str) -> None:
 def test_the_nearest_question_is_named_first() -> None:
     with pytest.raises(BadInput, match=r"expected a question as 'is the door shut\?', "):
         answers(RUN, "is the garage-door shut?")
-
-
-def test_another_question_is_answered_with_those_that_are_known() -> None:
-    with pytest.raises(BadInput, match=r"expected a question as 'wh.+; 'colour' said nothing"):
-        list(answers(RUN, "what colour is it?"))

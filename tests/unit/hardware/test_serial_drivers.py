@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import pytest
 
 from harvey.hardware.drivers.base_driver import SerialLink
-from harvey.hardware.drivers.denning import BAUD, DenningBase
-from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator, InstantMotion
+from harvey.hardware.drivers.denning import BAUD
+from sim.emulators.denning_emulator import ConstantSpeedMotion, DenningEmulator
 from sim.emulators.emulator import IdealGround
-from sim.emulators.line import EmulatedLine, PseudoTerminal
+from sim.emulators.line import PseudoTerminal
 from tests.serial_bench import (
     OF_SENSES,
     ON_EMULATED_LINE,
@@ -22,7 +21,6 @@ from tests.serial_bench import (
     over_emulated_line,
     over_line_in_memory,
 )
-from world_models.entries import MotionReport, MotorCommand
 
 
 @pytest.mark.parametrize("check", ON_EMULATED_LINE)
@@ -49,47 +47,6 @@ def test_what_is_reported_is_what_was_done(how: str, seed: int) -> None:
 
 def test_its_line_runs_as_its_document_says() -> None:
     assert BAUD == 38400
-
-
-def test_a_repeated_denning_command_moves_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    floor = IdealGround()
-    end = DenningEmulator(ConstantSpeedMotion(floor))
-    link = EmulatedLine(end)
-    said: list[bytes] = []
-    real = link.write
-
-    def twice(data: bytes) -> None:
-        said.append(data)
-        real(data + data)
-
-    monkeypatch.setattr(link, "write", twice)
-    base = DenningBase(link)
-    base.move(0.3)
-    base.move(0.2)
-    for old in said:
-        real(old)
-    link.read(3.0)
-    assert floor.moved_m == pytest.approx(0.5) and len(end.executed) == 2
-    base.close()
-
-
-def test_over_a_body_that_acts_at_once_the_denning_reports_are_the_bodys_own() -> None:
-    class Body:
-        speed_m_per_s = 0.5
-
-        def execute(self, command: MotorCommand) -> MotionReport:
-            return MotionReport(command.turn_rad * (1 + 2**-50), command.move_m / 3.0, 0.1 + 0.2, 1e-17)
-
-        def take_contact(self) -> None:
-            return None
-
-        def ranges(self) -> None:
-            return None
-
-    base = DenningBase(EmulatedLine(DenningEmulator(InstantMotion(Body()))))
-    command = MotorCommand(-0.1, math.pi)
-    assert base.execute(command) == Body().execute(command)
-    base.close()
 
 
 def test_a_serial_link_opens_reads_writes_and_says_what_is_wrong() -> None:

@@ -119,32 +119,6 @@ def test_a_source_that_does_not_open_is_unplugged(tmp_path: Path) -> None:
         VideoCamera(str(tmp_path / "none.avi"), None, clock=lambda: 0.0)
 
 
-def test_a_live_camera_answers_with_a_picture_begun_after_the_call(live: Callable[..., VideoCamera]) -> None:
-    camera = live(FakeCapture([jpeg(99)]))
-    first, second = camera.look("track"), camera.look("track")
-    assert first.jpeg == jpeg(99)
-    assert 0.0 <= first.sim_time_s <= second.sim_time_s
-    assert (first.number, second.number) == (0, 1)
-
-
-def test_an_image_that_is_not_compressed_is_compressed(live: Callable[..., VideoCamera]) -> None:
-    image = np.full((48, 64, 3), 120, np.uint8)
-    assert live(FakeCapture([image])).look().jpeg.startswith(b"\xff\xd8")
-
-
-@pytest.mark.parametrize(
-    ("picture", "kind"),
-    [
-        (jpeg(99)[:-40], "dropped"),
-        (b"\x00" * 100, "dropped"),
-        (jpeg(0), "dark"),
-        (jpeg(99, (32, 32)), "wrong size"),
-    ],
-)
-def test_faults_of_pictures(live: Callable[..., VideoCamera], picture: bytes, kind: str) -> None:
-    assert kind_of(live(FakeCapture([picture]))) == kind
-
-
 def test_an_unplugged_camera_is_found_again(live: Callable[..., VideoCamera], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("harvey.hardware.drivers.video_camera.REOPEN_S", 0.0)
     gone = FakeCapture([jpeg(50), jpeg(50)], endless=False)
@@ -158,18 +132,6 @@ def test_an_unplugged_camera_is_found_again(live: Callable[..., VideoCamera], mo
         if seen == jpeg(77):
             break
     assert seen == jpeg(77) and gone.released
-
-
-def test_too_few_pictures_a_second_are_a_fault(live: Callable[..., VideoCamera]) -> None:
-    camera = live(FakeCapture([jpeg(99)]), rate_hz=30.0)  # the fake's pictures are 40 ms apart
-    kinds = set()
-    for _ in range(200):
-        try:
-            camera.look()
-        except CameraFault as fault:
-            kinds.add((fault.kind, fault.detail.split(",")[0]))
-            break
-    assert kinds == {("late", "30 pictures a second are needed")}
 
 
 def test_what_is_no_picture_is_none() -> None:

@@ -64,12 +64,6 @@ def test_the_encoders_claim_what_was_commanded_to_their_resolution() -> None:
     assert (turn, move) == pytest.approx((0.123, -0.504), abs=1e-12)
 
 
-def test_an_arc_is_tangent_to_the_robot_at_its_start() -> None:
-    short = arc(0.01, 0.2)
-    assert abs(short.y_m / short.x_m) < 0.0011
-    assert arc(1.0, 0.2).heading_rad == pytest.approx(0.2)
-
-
 @pytest.mark.parametrize("bad", [{"turn_sigma_rad": -1.0}, {"shortfall_low": 0.5}, {"speed_m_per_s": 0.0},
                                  {"distance_sigma": math.nan}])
 def test_impossible_parameters_are_refused(bad: dict[str, float]) -> None:

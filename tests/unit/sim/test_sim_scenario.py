@@ -11,7 +11,6 @@ from sim.faults.built_in_faults import Kidnap, LightsOff
 from sim.render.sensor import SensorParameters, expose
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios
-from world_models.commands import parse_ptrans
 from world_models.entries import Place
 
 MINIMAL = 'world = "w"\ngoal = "(ptrans (a (1,2,0)) (b (3.5,-4,0)))"\n'
@@ -28,20 +27,6 @@ def test_the_main_mission_is_figure_17s() -> None:
     assert scenario.goal == "(ptrans (robot-laboratory (16,2,0)) (allens-office (13,12,0)))"
     assert scenario.servo.action and scenario.servo.plan and scenario.servo.goal
     assert not scenario.arrival.matters
-
-
-def test_places_are_in_feet() -> None:
-    start, goal = parse_ptrans("(ptrans (robot-laboratory (16,2,0)) (allens-office (13,12,0)))")
-    assert start == Place("robot-laboratory", 16 * 0.3048, 2 * 0.3048)
-    assert (goal.locale, goal.y_m) == ("allens-office", 12 * 0.3048)
-
-
-def test_units_are_in_the_keys() -> None:
-    tables = "[start]\nheading_deg = 90\nput_down_sigma_in = 2\n[camera]\nmount_height_ft = 3\n"
-    scenario = parse_scenario(MINIMAL + tables)
-    assert scenario.start.heading_rad == pytest.approx(math.pi / 2)
-    assert scenario.start.put_down_sigma_m == pytest.approx(0.0508)
-    assert scenario.camera.mount.height_m == pytest.approx(0.9144)
 
 
 def test_faults_keep_their_order_and_kind() -> None:

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sim.body.simulated_body import SimulatedBody
-from sim.faults.built_in_faults import Bump, Kidnap
+from sim.faults.built_in_faults import Bump
 from sim.render.mesh import Pinhole, project_mesh
 from sim.render.rasterizer import find_visible_patches
 from sim.scenario import ScenarioError, load_scenario, parse_scenario, with_settings
 from sim.scenario_names import list_scenarios
 from sim.stage import Stage, build_stage
-from world_models.entries import MotorCommand
 from world_models.frames import Pose2
 
 
@@ -50,41 +47,6 @@ def test_the_building_has_no_holes_where_the_mission_goes(main_stage: Stage, loc
         pose = settings.mount.camera_from_robot @ robot.lifted().inverse()
         seen = find_visible_patches(mesh, project_mesh(mesh, lens, pose.rotation, pose.translation), lens, 4)
         assert np.mean(seen < 0) < 1e-5
-
-
-def test_seeds_put_the_robot_down_differently_and_repeatably(main_stage: Stage) -> None:
-    places = [main_stage.body(seed).truth.world_from_robot for seed in (0, 0, 1)]
-    assert places[0] == places[1] != places[2]
-    assert max(p.distance_to(main_stage.start_world) for p in places) < 0.3
-    assert main_stage.body(3).look().jpeg == main_stage.body(3).look().jpeg
-
-
-def test_a_run_is_scored_against_the_goal_in_the_world(main_stage: Stage) -> None:
-    body = main_stage.body(0)
-    body.execute(MotorCommand(0.0, 0.3))
-    result = main_stage.score(body.track)
-    truth = body.truth.world_from_robot
-    assert result.position_error_m == pytest.approx(truth.distance_to(main_stage.goal_world))
-    assert result.heading_error_rad is None and result.collisions == 0
-
-
-def test_the_hallway_kidnap_happens_in_the_hallway_once() -> None:
-    stage = build_stage(load_scenario("hallway-kidnap"))
-    kidnap = stage.scenario.faults[0]
-    assert kidnap == Kidnap("hallway", after_m=6 * 0.3048, distance_m=1.0, turn_rad=math.radians(20.0))
-    start = Pose2(12.0, 1.2, 0.0)
-    jumps = jumps_of(SimulatedBody(stage.building, start, stage.scenario.camera.camera, stage.scenario.camera.mount,
-                                   seed=2, faults=stage.scenario.faults))
-    assert len(jumps) == 1
-    assert jumps[0] == pytest.approx(1.0, abs=0.03)
-
-
-def jumps_of(body: SimulatedBody) -> list[float]:
-    """Lengths of the displacements [m] that are no driving, over eight increments."""
-    for _ in range(8):
-        body.execute(MotorCommand(0.0, 0.6))
-    poses = [t.world_from_robot for t in body.track]
-    return [b.distance_to(a) for a, b in pairwise(poses) if b.distance_to(a) > 0.1]
 
 
 def test_a_scenario_that_does_not_fit_the_world_is_refused(main_stage: Stage) -> None:
