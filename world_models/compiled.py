@@ -27,7 +27,7 @@ def inlined(function: F) -> F:
 def _load(cache: Any, signature: Any, target: Any) -> Any:
     """What the cache has for a signature, or None.
 
-    numba's own way prepares the compiler first, whether or not there is anything to compile: half a second (numba 0.68).
+    numba's own way prepares the compiler first, whether there is anything to compile or not: half a second.
     What was compiled needs the run time only; the compiler prepares itself when it is called.
     """
     rtsys.initialize(target)
