@@ -41,6 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     _occupy_streams()
     if isinstance(sys.stdout, TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # a terminal may not know every letter
+    thresholds = gc.get_threshold()
     gc.set_threshold(*GC_THRESHOLDS)
     atexit.register(gc.freeze)  # what is left then goes with the process: a third of a second to look through it
     try:
@@ -48,6 +49,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt as stop:
         _print_error("interrupted", stop)
         return INTERRUPTED
+    finally:
+        gc.set_threshold(*thresholds)  # a process that goes on needs its own
 
 
 def _occupy_streams() -> None:

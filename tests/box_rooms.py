@@ -10,7 +10,12 @@ import shapely
 from numpy.typing import NDArray
 
 from experiments.generated.scenes import Patch, PatchFace
+from world_models.building.building import Building
 from world_models.building.world import World
+from world_models.camera import Camera
+from world_models.frames import Pose
+from world_models.visibility.culling import hidden_points
+from world_models.visibility.lines_and_points import _CameraView
 
 
 def box_faces(low: Any, high: Any, name: str, *, inside: bool = False, **appearance: Any) -> tuple[PatchFace, ...]:
@@ -86,3 +91,9 @@ def barriers(world: World, rooms: Sequence[str]) -> shapely.Geometry:
                 for room in rooms for d in world.doorways_of(room)]
     things = [shapely.Polygon(f) for room in rooms for f in world.obstacles(room)]
     return shapely.union_all([outlines.difference(shapely.union_all(openings)), *things])
+
+
+def find_hidden(building: Building, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
+    """(n,) which of the points (n, 3) [m, world] in front of the camera are hidden by surfaces of the model."""
+    view = _CameraView(building, camera, camera_from_world)
+    return hidden_points(camera_from_world.apply(points_world), view.shadows())

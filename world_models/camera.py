@@ -87,14 +87,6 @@ class Camera:
         zoomed = (replace(plain, fx=f * self.fx, fy=f * self.fy) for f in _ZOOMS)
         return next((camera for camera in zoomed if self._fills(camera)), plain)
 
-    def distort(self, pixels: Any) -> NDArray[np.float64]:
-        """Distorted pixels (..., 2) of undistorted pixels (..., 2) with the same focal lengths."""
-        p = np.asarray(pixels, float)
-        if self.distortion is None:
-            return p
-        centre, focal = np.array([self.cx, self.cy]), np.array([self.fx, self.fy])
-        return np.asarray(self._distort((p - centre) / focal) * focal + centre)
-
     def project(self, points_camera: Any) -> NDArray[np.float64]:
         """Pixels (..., 2) of points (..., 3) [m, camera frame], which must lie in front of the camera.
 

@@ -113,8 +113,9 @@ class Pose2:
     heading_rad: float
 
     def __post_init__(self) -> None:
-        for name in ("x_m", "y_m", "heading_rad"):
-            object.__setattr__(self, name, float(getattr(self, name)))
+        if not type(self.x_m) is type(self.y_m) is type(self.heading_rad) is float:  # most are made of floats
+            for name in ("x_m", "y_m", "heading_rad"):
+                object.__setattr__(self, name, float(getattr(self, name)))
 
     @property
     def position(self) -> NDArray[np.float64]:

@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from world_models.compiled import compiled
 
 Ints = NDArray[np.int32]
 Floats = NDArray[np.float32]
@@ -48,7 +49,7 @@ def split_pieces(seen: NDArray[np.int16], offsets: NDArray[np.float64], patches:
     return Pieces(ints[0], ints[1], ints[2], ints[3], floats[0], floats[1], floats[2], order, first, bare)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _find_mixed(seen: Any) -> Any:
     """(height, width), not 0 for pixels that see more than one patch, or the background, at their samples."""
     height, samples, width = seen.shape
@@ -63,7 +64,7 @@ def _find_mixed(seen: Any) -> Any:
     return mixed
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _most_pieces(seen: Any) -> int:
     """An upper bound of the number of pieces, for the memory; a tight one, as allocation takes time.
 
@@ -83,7 +84,7 @@ def _most_pieces(seen: Any) -> int:
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _split_rows(seen: Any, offsets: Any) -> Any:
     """The fields of :class:`Pieces`: row, column, length, patch (4, n); weight, u, v (3, n); bare (height, width)."""
     height, _, width = seen.shape
@@ -107,7 +108,7 @@ def _split_rows(seen: Any, offsets: Any) -> Any:
     return ints[:, :at], floats[:, :at], bare
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _split_pixel(seen: Any, x: int, y: int, offsets: Any, ints: Any, floats: Any, bare: Any, at: int) -> int:
     """Append the pieces of a pixel with samples ``seen`` (N,); returns the new end."""
     samples = len(offsets)
@@ -132,7 +133,7 @@ def _split_pixel(seen: Any, x: int, y: int, offsets: Any, ints: Any, floats: Any
     return at
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _sort_by_patch(patch: Any, patches: int) -> Any:
     """``order`` and ``first`` of :class:`Pieces`."""
     order, first = np.empty(len(patch), np.int32), np.zeros(patches + 2, np.int64)

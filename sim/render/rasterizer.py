@@ -14,10 +14,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from sim.render.mesh import Mesh, MeshView, Pinhole
+from world_models.compiled import compiled, inlined
 
 NEAR_M = 0.02
 """Depth of the near clipping plane [m]."""
@@ -67,7 +67,7 @@ def sample_offsets(samples: int) -> NDArray[np.float64]:
     return (np.array(ROOKS[samples]) + 0.5) / samples - 0.5
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _clip_near(vertices: Any, start: int, end: int, out: Any) -> int:
     """Cut a polygon in the camera frame at z = NEAR_M into ``out``; returns the number of vertices left."""
     count = 0
@@ -86,7 +86,7 @@ def _clip_near(vertices: Any, start: int, end: int, out: Any) -> int:
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _add_edges(pixels: Any, k: int, down: bool, edges: Any, at: int) -> int:
     """Append the edges of a polygon that run down (or up) as upper end x, y and dx/dy; returns the new end.
 
@@ -103,7 +103,7 @@ def _add_edges(pixels: Any, k: int, down: bool, edges: Any, at: int) -> int:
     return at
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _outlines(vertices: Any, first: Any, facing: Any, fx: float, fy: float, cx: float, cy: float,
               width: int, height: int, longest: int) -> Any:
     """Outlines in the image: edges (E, 3), and boxes (P, 5) of top, low, left, right [px] and greatest 1/z.
@@ -140,7 +140,7 @@ def _outlines(vertices: Any, first: Any, facing: Any, fx: float, fy: float, cx: 
     return boxes, edges, ends
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _span(edges: Any, ends: Any, y: float, width: int) -> Any:
     """The span (left, right) [px] of a convex outline in the row at ``y``."""
     left, right = -1.5, width + 0.5
@@ -151,7 +151,7 @@ def _span(edges: Any, ends: Any, y: float, width: int) -> Any:
     return left, right
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _cover_tiles(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, width: int, height: int) -> Any:
     """For each tile of the image, the greatest 1/z that a patch which covers the whole tile has everywhere in it."""
     covered = np.zeros(((height + TILE_PX - 1) // TILE_PX, (width + TILE_PX - 1) // TILE_PX))
@@ -172,7 +172,7 @@ def _cover_tiles(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, width: 
     return covered
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _cull_hidden(boxes: Any, covered: Any) -> None:
     """Empty the boxes of patches that are hidden in every tile that they reach into."""
     high, wide = covered.shape
@@ -189,13 +189,13 @@ def _cull_hidden(boxes: Any, covered: Any) -> None:
             boxes[p, 1] = boxes[p, 0]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _tile(at: float, count: int) -> int:
     """The tile, 0..count - 1, in or next to which an image coordinate lies."""
     return int(min(max(at + 0.5, 0.0) / TILE_PX, count - 1.0))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _patches_of_rows(boxes: Any, height: int) -> Any:
     """The patches in row y, ``rows[row_first[y]:row_first[y + 1]]``, in the order of the mesh."""
     spans = np.zeros((len(boxes), 2), np.int64)
@@ -218,7 +218,7 @@ def _patches_of_rows(boxes: Any, height: int) -> Any:
     return rows, row_first
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _fill_long(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, front: Any) -> None:
     """Write a patch into a span of a sub-row wherever it is not farther than what is there.
 
@@ -232,7 +232,7 @@ def _fill_long(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest:
         seen[i] = (seen[i] & ~front[i]) | (patch & front[i])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _fill_short(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest: Any, seen: Any, r: int, start: int,
                 end: int) -> None:
     """The same for columns ``start`` to ``end`` of sub-row r, one by one (unsigned: no test for negative indices)."""
@@ -243,13 +243,13 @@ def _fill_short(inverse_depth: Any, step: Any, columns: Any, patch: Any, nearest
             seen[r, i] = patch
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _column(x: float, width: int) -> int:
     """The first column, 0..width, whose sample is not left of x; faster than math.ceil."""
     return width - int(width - min(max(x, 0.0), float(width)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse_depths: Any, offsets: Any,
                 columns: Any, nearest: Any, seen: Any, front: Any) -> None:
     """Write patch p into the sub-rows (N, width) of one pixel row, at ``heights`` (N,) [px]."""
@@ -268,7 +268,7 @@ def _fill_patch(p: int, heights: Any, boxes: Any, edges: Any, ends: Any, inverse
             _fill_long(w, step, columns[start:end], patch, nearest[r, start:end], seen[r, start:end], front[start:end])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _fill(boxes: Any, edges: Any, ends: Any, inverse_depths: Any, rows: Any, row_first: Any, offsets: Any,
           width: int, height: int) -> Any:
     """The patch at every sample, row by row, so that the depth buffer of one row stays in the cache."""

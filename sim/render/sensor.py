@@ -7,9 +7,9 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from world_models.compiled import compiled
 from world_models.units import Bounded, bounded
 
 MIN_SHADE, MAX_SHADE = 0.05, 0.6
@@ -117,7 +117,7 @@ def compress_jpeg(image_rgb: NDArray[np.uint8], quality: int) -> bytes:
     return bytes(data)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _add_noise(radiance: Any, gain: Any, read_variance: Any, shot: Any, key: Any, salt: Any) -> Any:
     """Add noise of variance ``read_variance + shot * level`` and round to 8 bits.
 

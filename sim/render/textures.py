@@ -15,8 +15,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from world_models.compiled import compiled, inlined
 
 TEXTURES = ("plain", "speckle", "wood", "brick", "tiles", "carpet", "stripes", "poster")
 PLAIN, SPECKLE, WOOD, BRICK, TILES, CARPET, STRIPES, POSTER = range(8)
@@ -75,7 +76,7 @@ def texture_code(name: str) -> int:
     return TEXTURES.index(name)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _set_fade(p: Any, n: int, along_s: float, along_t: float) -> bool:
     """Find the contrast that the footprints leave at so many cells a unit; returns whether there is any."""
     fs, ft = np.float32(along_s), np.float32(along_t)
@@ -84,14 +85,14 @@ def _set_fade(p: Any, n: int, along_s: float, along_t: float) -> bool:
     return bool(p.left[:n].any())
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _cell(i: Any, j: Any, seed: int) -> Any:
     """Index in the table of the cell (i, j), whole float32 numbers, of the texture with this seed."""
     column = np.int32(np.int32(i) + np.int32(113 * seed)) & LAST_COLUMN
     return np.uint32(column + ROW_LENGTH * (np.int32(np.int32(j) + np.int32(59 * seed)) & LAST_COLUMN))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _look_up(p: Any, n: int, table: Any) -> None:
     """The noise ``value`` at the place (a, b) in a cell, times the contrast that is left."""
     for k in range(n):
@@ -99,7 +100,7 @@ def _look_up(p: Any, n: int, table: Any) -> None:
         p.value[k] = p.left[k] * (c[0] + p.a[k] * c[1] + p.b[k] * (c[2] + p.a[k] * c[3]))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _add_noise(p: Any, n: int, table: Any, along_s: float, along_t: float, contrast: float, seed: int) -> None:
     """Add smooth noise with ``along_s`` x ``along_t`` cells a unit to the tone."""
     fs, ft, strength = np.float32(along_s), np.float32(along_t), np.float32(contrast)
@@ -116,13 +117,13 @@ def _add_noise(p: Any, n: int, table: Any, along_s: float, along_t: float, contr
         p.tone[k] += strength * p.value[k]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _overlap(s: Any, half: Any, i: Any) -> Any:
     """The part of the interval s - half .. s + half, which begins in cell i, beyond that cell."""
     return np.minimum(ONE, np.maximum(ZERO, (s + half - i - ONE) / np.maximum(TWO * half, MIN_HALF)))
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _find_blocks(p: Any, n: int, table: Any, along_s: float, along_t: float, seed: int) -> None:
     """A patchwork of cells of random brightness in [-1, 1], averaged over the footprint (exact below one cell)."""
     fs, ft = np.float32(along_s), np.float32(along_t)
@@ -135,7 +136,7 @@ def _find_blocks(p: Any, n: int, table: Any, along_s: float, along_t: float, see
     _look_up(p, n, table)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _add_poster(p: Any, n: int, table: Any, seed: int, channel: int) -> None:
     """A poster: large blocks of colour with rows of small dark ones, like print."""
     _find_blocks(p, n, table, 1.0, 1.0, seed + 7 * channel)
@@ -146,7 +147,7 @@ def _add_poster(p: Any, n: int, table: Any, seed: int, channel: int) -> None:
         p.tone[k] += np.float32(0.2) * np.minimum(ZERO, p.value[k])
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _pulse(x: Any, half: Any, duty: Any) -> Any:
     """A square wave of period 1, which is 1 on the first ``duty`` of it, averaged over x - half .. x + half."""
     half = np.maximum(half, MIN_HALF)
@@ -155,7 +156,7 @@ def _pulse(x: Any, half: Any, duty: Any) -> Any:
     return ((j - i) * duty + np.minimum(high - j, duty) - np.minimum(low - i, duty)) / (TWO * half)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _add_grid(p: Any, n: int, table: Any, bond: float, courses: float, joint: tuple[float, float], contrast: float,
               dark: float, seed: int) -> None:
     """Bricks or tiles of random tone, and ``dark`` joints that take these parts of their length and height.
@@ -179,7 +180,7 @@ def _add_grid(p: Any, n: int, table: Any, bond: float, courses: float, joint: tu
         p.tone[k] = grey + (p.tone[k] + strength * p.value[k] - grey) * p.a[k] * p.b[k]
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _find_tone(p: Any, n: int, table: Any, code: int, seed: int, channel: int) -> None:
     """The texture's brightness factor at n points."""
     p.tone[:n] = ONE
@@ -205,7 +206,7 @@ def _find_tone(p: Any, n: int, table: Any, code: int, seed: int, channel: int) -
         _add_poster(p, n, table, seed, channel)
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _locate(p: Any, n: int, appearance: Any) -> None:
     """Find texture coordinates and footprints of n pixels (u, v); ``appearance`` is a row of :func:`shade`'s."""
     f = appearance.astype(np.float32)
@@ -227,7 +228,7 @@ def _locate(p: Any, n: int, appearance: Any) -> None:
         p.t[k] = p.t[k] * scale + base_t
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@inlined
 def _find_colours(p: Any, n: int, appearance: Any, table: Any, haze_per_m: float, colours: Any) -> None:
     """Colours (3, n) of a patch at n pixels (u, v)."""
     _locate(p, n, appearance)
@@ -240,13 +241,13 @@ def _find_colours(p: Any, n: int, appearance: Any, table: Any, haze_per_m: float
             colours[channel, k] = np.minimum(ONE, light * p.tone[k] / (ONE + haze * p.z[k]))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _points(n: int) -> Any:
     f = np.empty((12, n), np.float32)
     return Points(f[0], f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11], np.empty(n, np.uint32))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def background(bare: Any) -> Any:
     """The image (height, width, 3) float32 of the background alone; ``bare`` is the part of each pixel that sees it."""
     image = np.empty((*bare.shape, 3), np.float32)
@@ -257,7 +258,7 @@ def background(bare: Any) -> Any:
     return image
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def shade(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -> Any:
     """The image (height, width, 3) float32, 0..1, of :class:`sim.render.pieces.Pieces`.
 
@@ -276,7 +277,7 @@ def shade(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -> Any:
     return image
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def shade_pieces(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -> Any:
     """The colours (n, 3) of the pixels of all pieces, in the order of ``pieces.order``; see :func:`shade`."""
     out, at = np.empty((np.sum(pieces.length), 3), np.float32), 0
@@ -293,7 +294,7 @@ def shade_pieces(pieces: Any, appearances: Any, table: Any, haze_per_m: float) -
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _gather(pieces: Any, start: int, last: int, p: Any) -> Any:
     """Read the pixels (u, v) of a batch of pieces; returns their number and the first piece of the next batch."""
     n = 0
@@ -306,7 +307,7 @@ def _gather(pieces: Any, start: int, last: int, p: Any) -> Any:
     return n, start
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _scatter(pieces: Any, start: int, end: int, colours: Any, image: Any) -> None:
     """Add the colours (3, n) of a batch of pieces to the image."""
     n = 0

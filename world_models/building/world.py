@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from world_models.building.building import Building
 from world_models.building.geometry.faces import Face
@@ -29,9 +29,6 @@ from world_models.building.locales import (
 )
 from world_models.building.passages import build_passage_graphs, drivable_passages
 from world_models.frames import Pose
-
-if TYPE_CHECKING:
-    import networkx as nx
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -165,22 +162,9 @@ class World(Building):
         """Model lines and surfaces of the whole world."""
         return concatenate_scenes([part.scene for part in self.parts] or [build_scene((), ())])
 
-    @cached_property
-    def passages(self) -> nx.Graph:
-        """Rooms joined by open doorways; each edge carries ``doorways`` (tuple of Doorway)."""
-        import networkx as nx  # here, so that a world can be read without it
-
-        graph = nx.Graph()
-        graph.add_nodes_from(self.rooms)
-        for doorway in self.doorways:
-            a, b = doorway.between
-            known = graph.edges[a, b]["doorways"] if graph.has_edge(a, b) else ()
-            graph.add_edge(a, b, doorways=(*known, doorway))
-        return graph
-
     def walk(self, origin: str, destination: str) -> list[str] | None:
         """The rooms of the route with the fewest passages of the whole world, stairs included; None for no route."""
-        import networkx as nx
+        import networkx as nx  # here, so that a world can be read without it
 
         passages: tuple[Doorway | Link, ...] = (*self.doorways, *self.links)
         ways: nx.Graph = nx.Graph(passage.between for passage in passages)

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from world_models.building.building import Building
 from world_models.building.geometry.outlines import subtract_intervals
 from world_models.building.locales import Doorway
 from world_models.camera import NEAR_PLANE_M, Camera
+from world_models.compiled import compiled
 from world_models.frames import Pose
 
 Point = tuple[float, float, float]
@@ -267,7 +267,7 @@ def visible_spans(lines: Floats, shadows: Shadows) -> tuple[NDArray[np.int64], F
     return table[:, 0].astype(np.int64), table[:, 1:]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _find_hidden_spans(
     lines: Floats, own: Floats, bounds: Floats, windows: Floats, nearest_m: Floats
 ) -> tuple[list[int], list[float], list[float]]:  # pragma: no cover

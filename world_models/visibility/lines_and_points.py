@@ -190,12 +190,6 @@ def visible_points(
                          scene.corner_index[index], contrast[index], scene.marks)
 
 
-def find_hidden(building: Building, camera: Camera, camera_from_world: Pose, points_world: Any) -> NDArray[np.bool_]:
-    """(n,) which of the points (n, 3) [m, world] in front of the camera are hidden by surfaces of the model."""
-    view = _CameraView(building, camera, camera_from_world)
-    return hidden_points(camera_from_world.apply(points_world), view.shadows())
-
-
 class _CameraView:
     """The locales and surfaces in view of one camera pose."""
 

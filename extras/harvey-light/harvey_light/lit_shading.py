@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from world_models.compiled import compiled
 
 GAMMA = np.float32(2.2)
 NORMAL_REFLECTANCE = np.float32(0.04)
@@ -17,7 +18,7 @@ ZERO, ONE, HALF, MIN_INVERSE_DEPTH = np.float32(0.0), np.float32(1.0), np.float3
 NO_MIRROR = -1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def shade_lit(pieces: Any, colours: Any, forms: Any, grid: Any, first: Any, light: Any, image: Any, glossy: Any,
               gloss: Any, reaches: Any, mirrors: Any, rays: Any) -> None:
     """Add the pieces to ``image`` (height, width, 3), which has the background.

@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from sim.render.mesh import Mesh
+from world_models.compiled import compiled
 
 Floats = NDArray[np.float64]
 LEAF = 4
@@ -76,7 +76,7 @@ def _sides(mesh: Mesh) -> Floats:
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def first_hits(tree: Any, origins: Any, directions: Any, limits: Any) -> Any:
     """The patches (n,) that rays from ``origins`` (n, 3) meet first within ``limits`` (n,), and at which lengths."""
     patches, lengths = np.empty(len(origins), np.int64), np.empty(len(origins))
@@ -87,7 +87,7 @@ def first_hits(tree: Any, origins: Any, directions: Any, limits: Any) -> Any:
     return patches, lengths
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _meet(tree: Any, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, limit: float, is_any: bool,
           stack: Any) -> Any:
     """The first patch that a ray meets within ``limit`` lengths of its direction, or any where that is enough."""
@@ -130,7 +130,7 @@ def _meet(tree: Any, ox: float, oy: float, oz: float, dx: float, dy: float, dz: 
     return patch, best
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def direct_light(tree: Any, points: Any, normals: Any, sources: Any, reach_m: float) -> Any:
     """Irradiance (n, 3) of points (n, 3) with normals (n, 3) by small flat sources that light before themselves.
 
@@ -157,7 +157,7 @@ def direct_light(tree: Any, points: Any, normals: Any, sources: Any, reach_m: fl
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def gather_hits(tree: Any, points: Any, normals: Any, grid: Any, first: Any, axes: Any, rays: int) -> Any:
     """The places (n, rays), by number, that cosine-distributed rays from points meet first; -1: none, or a back.
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Floats32
 from knowledge_sources.methods.features.picture import estimate_noise_sigma, require_grey
+from world_models.compiled import compiled
 
 ALIGNMENT_STEPS = 2  # gauss-Newton steps of the sub-pixel alignment
 # share of an edge's gradient energy that seems to lie along it (measured on rendered edges (tests/laws/features))
@@ -206,9 +206,6 @@ def _compute_scores(patch: Floats32, view: Floats32) -> Floats32:
     score = np.asarray(cv2.matchTemplate(view, patch, cv2.TM_CCOEFF_NORMED), np.float32)
     score[~np.isfinite(score)] = -1.0
     return score
-
-
-compiled = njit(cache=True, error_model="numpy")
 
 
 @compiled

@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Indices, Mask
 from world_models.camera import clip_segments
+from world_models.compiled import compiled
 
 MIN_GRADIENT_SIGMAS = 4.0  # least gradient of an edge pixel, in standard deviations of the gradient of pure noise
 MIN_EDGE_DENSITY = 0.6  # least share of a segment's length that has an edge pixel
@@ -39,8 +39,6 @@ CHAIN_GAP_PX = 2  # px; half the gap over which gradient peaks of a band are joi
 CHAIN_SCALE_PX = 0.5  # px; scale of the Geman-McClure weights of the line fit to a chain
 CHAIN_ITERATIONS = 3  # reweighting steps of the line fit to a chain
 MAX_CHAIN_RESIDUAL_PX = 1.0  # px; largest distance of a peak from the line of its chain
-
-compiled = njit(cache=True, error_model="numpy")
 
 _STEPS_PER_LEVEL = 32.0
 """Resolution at which gradients are sorted, so that they fit into two bytes (radix sort)."""

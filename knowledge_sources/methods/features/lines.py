@@ -14,11 +14,11 @@ from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Indices
 from knowledge_sources.methods.features.line_candidates import MIN_GRADIENT_SIGMAS, find_in_bands, find_line_regions
 from knowledge_sources.methods.features.picture import estimate_noise_sigma, to_grey_float
+from world_models.compiled import compiled
 
 LINE_SYSTEMATIC_PX = 0.03
 """Error of a segment's place that does not average out along it, added in quadrature (measured: a lens not quite
@@ -148,8 +148,6 @@ def _select(
     angle = np.hypot(fit.sigma_angle_rad, 12.0**0.5 * systematic / np.maximum(length, 1.0))
     return LineSegments(fit.segments_px, offset, angle, fit.contrast, predicted).take(keep)
 
-
-compiled = njit(cache=True, error_model="numpy")
 
 _BENDS = (0.44, 0.57, 0.65, 0.72, 0.76)
 """Bend of the logarithm of the gradient's peak behind a lens of blur 1.0, 0.7, 0.5, 0.3 and 0 px.

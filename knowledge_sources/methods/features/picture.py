@@ -15,11 +15,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.arrays import Floats32, Image
 from world_models.camera import Camera
+from world_models.compiled import compiled
 
 MIN_CONTRAST = 6.0  # a dark frame has less contrast (standard deviation of its grey values, 0 to 255) than this
 MIN_BRIGHTNESS = 40.0  # a dark frame also has a lower mean than this; a brighter one shows a bare wall
@@ -171,7 +171,7 @@ def estimate_noise_sigma(image: Floats32) -> float:
     return max(response / (0.6745 * 6.0), ROUNDING_SIGMA)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _compute_noise_response(image: Any, step: int) -> float:
     """Median absolute response of every ``step``-th row to Immerkaer's noise mask, blind to linear structure."""
     height, width = image.shape

@@ -259,7 +259,7 @@ def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> Tw
     now, earlier = (np.asarray(cv2.pyrDown(grey), np.float32) for grey in (both.picture[both.grid.top:], both.earlier))
     sweep = _Sweep(now, earlier)
     tested = sweep.tells & is_floor[::2, ::2]
-    contrast = _measure_contrast(now)[tested]
+    contrast = _measure_contrast(now, _blur(now))[tested]
 
     def see(change: Floats) -> Floats:
         """The contrast of the earlier picture where it is asked, if the motion was different; NaN outside it."""
@@ -267,7 +267,8 @@ def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> Tw
         if floor is None:
             return np.full(len(contrast), np.nan)
         seen = sweep.warp(np.diag([0.5, 0.5, 1.0]) @ floor @ np.diag([2.0, 2.0, 1.0]))
-        return np.where(_blur(seen)[tested] < 0.0, np.nan, _measure_contrast(seen)[tested])
+        mean = _blur(seen)
+        return np.where(mean[tested] < 0.0, np.nan, _measure_contrast(seen, mean)[tested])
 
     change, prior = np.zeros(3), np.diag(1.0 / np.square(np.maximum(sigmas, LEAST_SIGMAS)))
     information = prior
@@ -288,9 +289,8 @@ def _align(both: TwoPictures, is_floor: NDArray[np.bool_], sigmas: Floats) -> Tw
     return both._replace(earlier_from_now=_changed(both.earlier_from_now, change))
 
 
-def _measure_contrast(grey: Grey) -> Grey:
+def _measure_contrast(grey: Grey, mean: Grey) -> Grey:
     """Grey levels less their mean round each, in standard deviations round it."""
-    mean = _blur(grey)
     return np.asarray((grey - mean) / np.maximum(_measure_deviation(grey, mean), MIN_DEVIATION), np.float32)
 
 

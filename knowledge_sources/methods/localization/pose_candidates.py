@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 import shapely
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Floats32, Ints, Mask
 from knowledge_sources.methods.features import RIGHT_ANGLE_RAD, find_level_direction
@@ -26,6 +25,7 @@ from knowledge_sources.methods.motion import compute_free_space
 from knowledge_sources.methods.verification import take_distinct
 from world_models.building.building import Building
 from world_models.camera import Camera
+from world_models.compiled import compiled
 from world_models.frames import Pose, Pose2, wrap_angle
 from world_models.robot import RobotModel
 
@@ -112,7 +112,7 @@ def compute_chamfer_scores(
         CHAMFER_SHRINK, MIN_POINT_DEPTH_M))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _score(
     near: Any, chance: Any, lens: Any, mount: Any, shift: Any, poses: Any, points: Any, directions: Any, first: Any,
     visible: Any, cell: Any, stride: int, shrink: int, min_depth_m: float,
@@ -393,7 +393,7 @@ def _are_visible(eye: Floats, points: Floats, planes: Floats, polygons: Floats, 
     return np.asarray(_find_visible(eye, np.ascontiguousarray(points), planes[facing], polygons[facing], tolerance_m))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _find_visible(eye: Any, points: Any, planes: Any, polygons: Any, tolerance_m: float) -> Any:
     """(n,) which points are visible. The polygon that hid the last point is tried first."""
     out = np.ones(len(points), np.bool_)

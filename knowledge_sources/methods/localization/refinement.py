@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
@@ -35,6 +34,7 @@ from knowledge_sources.methods.verification import (
     predict_lines,
     take_distinct,
 )
+from world_models.compiled import compiled
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import visible_lines
@@ -242,7 +242,7 @@ def _pair(lines_px: Floats, segments_px: Floats, gate_px: float) -> Ints:
     return np.column_stack([nearest[data], data])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _find_nearest(lines: Any, segments: Any, gate_px: float, sine: float, min_overlap: float) -> Any:
     """(k,) index of the nearest line of about the direction of each segment, -1 where there is none."""
     out = np.full(len(segments), -1, np.int64)

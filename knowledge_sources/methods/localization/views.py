@@ -13,11 +13,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints, Mask
 from knowledge_sources.methods.features import RIGHT_ANGLE_RAD, find_level_direction
 from world_models.camera import Camera
+from world_models.compiled import compiled
 from world_models.entries import Obstruction
 from world_models.frames import Pose, Pose2, wrap_angle
 
@@ -321,7 +321,7 @@ def _lie_on(one_px: Floats, other_px: Floats) -> Mask:
         STATIONARY_RAD, STATIONARY_PX, MIN_STATIONARY_OVERLAP))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _find_lying_on(one: Any, other: Any, most_rad: float, most_px: float, min_overlap: float) -> Any:
     out = np.zeros((len(one), len(other)), np.bool_)
     along = np.empty((len(other), 3))  # direction and length of each other segment

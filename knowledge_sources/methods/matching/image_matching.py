@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from knowledge_sources.methods.arrays import Floats, Indices, Ints, Mask
-from knowledge_sources.methods.matching.matching_kernels import RIGID, compiled
+from knowledge_sources.methods.matching.matching_kernels import RIGID
 from knowledge_sources.methods.matching.search import (
     Correspondence,
     Fitting,
@@ -31,6 +31,7 @@ from knowledge_sources.methods.matching.search import (
     list_pairs,
     search_pairs,
 )
+from world_models.compiled import compiled
 
 MAX_PAIR_PX = 4.0
 """Largest distance of a data end from its model line in the image (§6.1.4 says 3 px; wider for perspective)."""

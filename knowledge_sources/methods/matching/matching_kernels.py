@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices, Ints, Mask
+from world_models.compiled import compiled
 
 SpaceArrays = tuple[Floats, Mask, Indices, Indices, Floats]
 """Forms (p, d, d), masks (p, c), model and data indices (p,), anchor (d, d) of a :class:`PairSpace`."""
@@ -19,8 +19,6 @@ TermArrays = tuple[Floats, Floats]
 """Scale (m,) and lengths (m,) of the omission, see :class:`Terms`."""
 StateArrays = tuple[Ints, Floats, Floats, Floats, Ints]
 Scratch = tuple[Floats, Floats, Floats]
-
-compiled = njit(cache=True, error_model="numpy")
 
 RIGID, STEP = 0, 1
 """What is fitted: a turn and a shift in the image; or a step of a pose, to first order."""

@@ -20,7 +20,6 @@ from scipy.special import ndtri
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
 from knowledge_sources.methods.matching.image_matching import COVERAGE_CELLS
-from knowledge_sources.methods.matching.matching_kernels import compiled
 from knowledge_sources.methods.matching.search import (
     POSE_STEP,
     Correspondence,
@@ -36,6 +35,7 @@ from knowledge_sources.methods.matching.search import (
 )
 from knowledge_sources.methods.pose import LineSet, build_line_set
 from world_models.camera import NEAR_PLANE_M, Camera
+from world_models.compiled import compiled
 from world_models.frames import Pose, Pose2, frozen
 
 MAX_ALLOWED_PAIRS = 60000  # most pairs that are looked at; of more, each model line's longest (experiment matcher)

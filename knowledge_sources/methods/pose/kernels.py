@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Indices, Mask
+from world_models.compiled import compiled
 
 RigidMotion = tuple[Floats, Floats]
 """R, T."""
@@ -48,8 +49,6 @@ PLANES, IMAGE = 0, 1
 
 FINE, NOT_FINITE, NO_LENGTH = 0, 1, 2
 """What is wrong with a row of a set of lines."""
-
-compiled = njit(cache=True, error_model="numpy")
 
 
 @compiled

@@ -15,13 +15,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Mask
 from knowledge_sources.methods.pose.line_set import check_matched_arrays
 from knowledge_sources.methods.pose.planar import to_pose2
 from world_models.building.model_errors import LineErrors
 from world_models.camera import CAMERA_UNKNOWNS, YAW, Camera, CameraMount
+from world_models.compiled import compiled
 from world_models.frames import Pose2
 
 WIDTHS_PX = (24.0, 12.0, 6.0, 3.0, 1.5)  # widths of the loss by which pose and camera are refined
@@ -262,7 +262,7 @@ def _build_estimate(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def measure_lines(
     model: Floats, segments: Floats, lens: Floats, mount: Floats, state: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
@@ -308,7 +308,7 @@ def measure_lines(
     return distances, slopes
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _place(point: Floats, mount: Floats, state: Floats, there: Floats, moved: Floats) -> None:  # pragma: no cover
     """Write a world point in the camera's frame, and its derivatives (7, 3) by what moves the camera."""
     c, s = math.cos(state[HEADING]), math.sin(state[HEADING])
@@ -327,7 +327,7 @@ def _place(point: Floats, mount: Floats, state: Floats, there: Floats, moved: Fl
     moved[ROLL, 0], moved[ROLL, 1], moved[ROLL, 2] = y, -x, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _turn(
     ahead: float, left: float, up: float, turned: tuple[float, float, float]
 ) -> tuple[float, float, float]:  # pragma: no cover
@@ -340,6 +340,6 @@ def _turn(
     return cr * right + sr * down, cr * down - sr * right, ct * front - st * up
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _cross(a: Floats, b: Floats) -> tuple[float, float, float]:  # pragma: no cover
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

@@ -15,7 +15,6 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.special import betainc, betaln
 
 from knowledge_sources.methods.arrays import Floats, Mask
@@ -23,6 +22,7 @@ from knowledge_sources.methods.pose import compute_camera_poses, compute_point_j
 from world_models.building.building import Building
 from world_models.building.model_errors import LineErrors, exact, find_line_errors
 from world_models.camera import Camera
+from world_models.compiled import compiled
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines, visible_lines
@@ -232,7 +232,7 @@ def _count(coverage: Floats, min_covered: float) -> Any:
     return np.count_nonzero(~np.isnan(coverage), axis=-1), np.count_nonzero(coverage >= min_covered, axis=-1)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _cover(lines: Any, segments: Any, tolerances: Any, sine: float, cells: int) -> Any:
     """(m,) part of the cells of each line over which a near and parallel segment lies; NaN where not in view."""
     out = np.empty(len(lines))

@@ -7,13 +7,13 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numba import njit
 
 from knowledge_sources.methods.arrays import Floats, Ints
 from world_models.building.building import Building
 from world_models.building.geometry.faces import Finish, area_vectors, expected_brightness
 from world_models.building.geometry.scene import LocaleGeometry
 from world_models.camera import NEAR_PLANE_M, Camera
+from world_models.compiled import compiled
 from world_models.frames import Pose, Pose2
 from world_models.robot import RobotModel
 from world_models.visibility.culling import Window, find_visible_locales, image_window
@@ -161,7 +161,7 @@ def _bound(corners: Floats) -> Floats:
     return np.asarray(box)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _cast_rays(corners: Any, normals: Any, boxes: Any, rays: Any, size: int, each: int) -> Any:
     """Index of the polygon (m, k, 3), camera frame, that each ray (x, y, 1) meets first (-1: none), and its depth [m].
 

@@ -33,7 +33,8 @@ def see(k1: float, pose: Pose2 = HERE, *, seed: int = 0, order: int = 1, **of: o
     expected = bench.apply(effect_on(bench.ask(ViewPredictor(), milestone), Milestone))[0].entry
     lines, pinhole = np.array(expected.value.expected), ROBOT.camera
     seen = pinhole.project_segments(lines, ROBOT.camera_from_world(to_world(pose)))[0]
-    bent = replace(pinhole, distortion=(k1, 0.0, 0.0, 0.0)).distort(seen + rng.normal(0.0, 0.15, seen.shape))
+    rays = pinhole.rays(seen + rng.normal(0.0, 0.15, seen.shape))
+    bent = replace(pinhole, distortion=(k1, 0.0, 0.0, 0.0)).project(rays)
     pairs = np.column_stack([np.arange(len(lines))] * 2)[::order]
     match = bench.put(LineMatch(expected.id, "Segments-1", pairs, lines[::order], bent[::order], 0.0,
                                 np.ones(len(lines))), expected)

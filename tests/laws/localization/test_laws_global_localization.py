@@ -11,6 +11,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from box_rooms import find_hidden
 from experiments.generated.floors import generated_floor
 from knowledge_sources.methods.features import RIGHT_ANGLE_RAD, find_level_direction
 from knowledge_sources.methods.localization import (
@@ -39,7 +40,6 @@ from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
-from world_models.visibility.lines_and_points import find_hidden
 
 Floats = NDArray[np.float64]
 CAMERA, MOUNT = Camera.from_field_of_view(math.radians(65.0)), CameraMount(1.0, 0.1)

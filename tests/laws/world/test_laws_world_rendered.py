@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from box_rooms import generate_house
+from box_rooms import find_hidden, generate_house
 from sim.render.mesh import Pinhole, build_mesh, project_mesh
 from sim.render.rasterizer import find_visible_patches, sample_offsets
 from world_models.building.checks import check_world
@@ -25,7 +25,6 @@ from world_models.camera import Camera, CameraMount
 from world_models.files.toml.source import Source
 from world_models.files.world_files import read_world
 from world_models.frames import Pose, Pose2
-from world_models.visibility.lines_and_points import find_hidden
 
 CAMERA = Camera.from_field_of_view(math.radians(65.0), 256, 256)
 MOUNT = CameraMount(1.0, 0.1)

@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from box_rooms import find_hidden
 from world_models.building.geometry.faces import Region
 from world_models.building.geometry.outlines import inside_polygon
 from world_models.building.geometry.scene import stack_regions
@@ -15,7 +16,7 @@ from world_models.camera import Camera, CameraMount
 from world_models.files.world_files import WORLDS, load_world
 from world_models.frames import Pose, Pose2
 from world_models.visibility.culling import CONTACT_M
-from world_models.visibility.lines_and_points import VisibleLines, find_hidden, visible_lines, visible_points
+from world_models.visibility.lines_and_points import VisibleLines, visible_lines, visible_points
 
 WORLD = load_world(WORLDS / "research_center.toml", details=[])
 CAMERA = Camera.from_field_of_view(math.radians(65.0))

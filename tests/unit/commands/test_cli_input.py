@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import socket
 from importlib.metadata import version
@@ -12,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from harvey.cli import main
+from harvey.cli import GC_THRESHOLDS, main
 from harvey.commands import MODULES
 from harvey.commands.world_command import VERBS
 from logs.run_directory import JOURNAL_VERSION, check_version, prepare_directory
@@ -98,6 +99,11 @@ def test_bad_input_is_named(argv: list[str], told: str, tmp_path: Path, capsys: 
     code, err = said(capsys, argv)
     assert code == 2
     assert told in err
+
+
+def test_a_scenario_that_is_not_there_is_named_before_anything_begins(capsys: pytest.CaptureFixture[str]) -> None:
+    assert said(capsys, ["run", "nosuch"])[1].startswith("harvey: scenario: expected one of")
+    assert gc.get_threshold() != GC_THRESHOLDS, "the process goes on with its own"
 
 
 def test_a_port_in_use_is_named_before_a_base_is_there(capsys: pytest.CaptureFixture[str]) -> None:

@@ -112,10 +112,6 @@ class Face:
     def __post_init__(self) -> None:
         object.__setattr__(self, "polygon_world", frozen(self.polygon_world, (None, 3)))
 
-    @property
-    def area_m2(self) -> float:
-        return float(np.linalg.norm(area_vector(self.polygon_world)))
-
 
 def area_vector(polygon_world: NDArray[np.float64]) -> NDArray[np.float64]:
     """(..., 3) normal of a flat polygon (..., k, 3) times its area (Newell's method) [m^2]."""
