@@ -20,6 +20,8 @@ from harvey_words.following.word_places import (
 )
 from harvey_words.reading.told_acts import ThingWords
 
+NO_DEAD_END = -3.0
+"""What is called a dead end, and has another way out."""
 UNTOLD = -4.0
 """A goal out of sight to which no way is told."""
 OPEN_ONLY = -1.8
@@ -75,7 +77,7 @@ class WordDoors(WordPlaces):
         """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
         ways = self.ways(state)
         halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
-        fit = self.fit_place(state, what, halls)
+        fit = self.fit_place(state, what, halls) + NO_DEAD_END * ("dead-end" in what.heads and len(ways) > 1)
         if fit > WORST:
             yield replace(state, odds=state.odds + fit)
 

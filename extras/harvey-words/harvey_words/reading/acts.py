@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -46,9 +47,13 @@ class _Reader:
             pass  # "to the end, four blocks"
         elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
+        elif verbs == {"see"} and not self.acts and not wheres and [one.is_door and bool(one.names) for one in things] == [
+                True]:
+            self.goals.append(Act("find", what=things[0]))  # "find Allen's office", and then how
         elif "goal" in verbs and (things or wheres) and not self._has_way():
             self.goals += [Act("see", what=one) for one in (*things, *(one for _, one in wheres)) if one.names]
-        elif "exit" in verbs:
+        elif "exit" in verbs or (not verbs and not self._has_way() and [
+                (meaning, one.is_door) for meaning, one in wheres] == [("from", True)]):  # "from your door, go left"
             self._exit(things, ways, wheres)
         elif things and self._is_walk_told([], []) and (
                 (self.notes_on and not verbs) or verbs in ({"note"}, {"pass"})):
@@ -57,6 +62,8 @@ class _Reader:
             self.acts += [Act("note", what=thing) for thing in things]
         elif self._is_posture(parts, verbs):
             self._posture(things, wheres)
+        elif verbs == {"face"} and not things and any(meaning in RELATIONS for meaning, _ in wheres):
+            self._state(things, ways, wheres, verbs)  # "look on the left, just past the machine room"
         elif "face" in verbs or (verbs & {"turn"} and not ways and wheres and wheres[0][0] in ("to", "away")):
             self._face(things, ways, wheres)
         elif "take" in verbs and set(ways) <= {"ahead"} and any("unit" in thing.heads for thing in things):
@@ -113,6 +120,9 @@ class _Reader:
                         -1].is_door:
                     things[-1] = replace(things[-1], relations=(
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
+                elif not verbs and not things and part.meaning in ("on", "in") and all(
+                        word.meaning == "it" for word in part.words) and part.words:
+                    continue  # "his name's on it"
                 elif part.words or part.meaning not in ("at", "on", "along" if self._it().is_door else "at"):
                     wheres.append((part.meaning, self._describe(part.meaning, part.words)))
                     target, located = None, True
@@ -159,7 +169,7 @@ class _Reader:
             thing = replace(hall if by & {"along", "go", "take"} else self._it(), side=thing.side, count=thing.count)
         if thing.names or thing.heads - {"side", "unit", "end"}:
             self.last_thing = thing
-            self.last_stretch = thing if thing.is_stretch else self.last_stretch
+            self.last_stretch = thing if thing.is_stretch and not by & {"past", "across"} else self.last_stretch
         return thing
 
     def _relation(self, meaning: str, words: Sequence[Word]) -> Iterable[tuple[str, ThingWords]]:
@@ -217,7 +227,9 @@ class _Reader:
 
     def _turn(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         halls = [thing for thing in things if thing.is_stretch]
-        onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
+        counted = next((thing.place for thing in things if "unit" in thing.heads), math.inf)
+        onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch
+                and not (meaning == "to" and one.place > counted)]  # "right one block to the blue hall" is to walk there
         at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
               and (one.heads or one.names)]
         begin = [meaning for meaning, one in wheres if meaning in ("past", "before") or one in onto][:1]
@@ -330,9 +342,10 @@ class _Reader:
         if doors or not things:
             doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
         if doors:
-            goal = _at_end(_merge(doors), wheres)
+            goal = _merge(doors)
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
                            relations=(*goal.relations, *related))
+            goal = _at_end(goal, wheres)
             self.acts.append(Act("find", what=goal))
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
@@ -383,7 +396,8 @@ class _Reader:
             goal = _merge(things)
             side, self.side = goal.side or next(iter(ways), self.side), ""
             is_beyond = any(meaning == "past" for meaning, _ in related)
-            is_named = last is not None and last.sort == "find" and bool(last.what and last.what.names)
+            is_named = last is not None and last.sort == "find" and bool(last.what and last.what.names) and not any(
+                last.what.names == one.names for _, one in related if last.what)  # "the room across from it"
             if is_named and not goal.names and not is_beyond:
                 self._amend(related, side)  # "the library is opposite, one door to the left"
             else:
@@ -458,6 +472,9 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     if reader.ahead and reader.acts[-1].sort == "see" and not reader.goals:  # "the lamp is one block ahead", no more
         what = reader.acts.pop().what
         reader.acts.append(Act("go", until=what and replace(what, side=""), units=reader.ahead))
+    if reader.acts and reader.acts[-1].sort == "find" == (reader.goals or reader.acts)[-1].sort and reader.goals:
+        what, goal = reader.acts.pop().what, reader.goals.pop()  # "find Allen's office; it is the next door"
+        reader.goals.append(replace(goal, what=what and goal.what and _merge((goal.what, what))))
     reader.acts += reader.goals
     if not any(act.sort in ("exit", "turn", "go") for act in reader.acts):  # "find the lamp, it is in the corner"
         reader.acts = [replace(act, sort="see") if act.sort == "orient" and act.what and act.what.side == "ahead"
@@ -467,7 +484,8 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
             reader.acts[:1] = [replace(act, sort="find") for act in reader.acts[:1] if act.what and act.what.names]
     for index, act in enumerate(reader.acts[:-1]):
         after = reader.acts[index + 1]
-        if act.sort == "find" == after.sort and after.what and any(by == "past" for by, _ in after.what.relations):
+        if act.sort == "find" == after.sort and act.what and after.what and any(
+                by == "past" or one.names == act.what.names for by, one in after.what.relations):
             reader.acts[index] = replace(act, sort="see")  # "the library is on the left; it is the door after that"
     done = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
     ordered_acts = [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
@@ -481,8 +499,15 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
 def _correct(clauses: Sequence[Clause]) -> list[Clause]:
     """``Turn right - no, left``: what is said after a correction stands for the clause before, or a part of it."""
     kept: list[Clause] = []
-    is_fix = False
+    is_fix = is_aside = False
     for clause in clauses:
+        verbs = {part.meaning for part in clause.parts if part.sort == "verb"}
+        if kept and clause.end != "but" and [part.meaning for part in clause.parts[:1]] == ["not"] and not verbs or (
+                is_aside and verbs == {"be"} and not any(word.sort == "COUNT" for part in clause.parts
+                                                         for word in part.words)):
+            is_aside = clause.end == "comma"
+            continue  # "the second door, not the first, that is Allen's"
+        is_aside = is_aside and not clause.parts
         wrong = next((place for place in range(len(kept) - 1, -1, -1) if kept[place].parts), None)
         if is_fix and clause.parts and wrong is not None:
             old, new = kept[wrong].parts, clause.parts
