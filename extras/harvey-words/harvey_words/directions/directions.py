@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 from harvey_words.following.reading import SURE, Reading, RouteError, find_start, read_route
-from harvey_words.following.word_doors import OPPOSITE_M
 from harvey_words.following.word_follower import WordFollower
 from harvey_words.following.word_map import (
     Area,
@@ -26,7 +25,7 @@ from harvey_words.following.word_map import (
     offsets,
     turned,
 )
-from harvey_words.following.word_places import HERE_M, NEAR_M, State
+from harvey_words.following.word_places import HERE_M, NEAR_M, OPPOSITE_M, State
 from harvey_words.reading.lexicon import lexicon_data
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
