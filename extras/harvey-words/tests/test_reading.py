@@ -199,6 +199,14 @@ def test_the_experiment_reads_routes_and_paragraphs() -> None:
         assert texts == count and arrive >= least * count and elsewhere <= 0.04 * count
 
 
+def test_another_language_is_another_lexicon() -> None:
+    said = "Raus, nach rechts, vorbei am Trinkbrunen, dann die erste Tür auf der rechten Seite"
+    german = PARAGRAPHS.with_name("german.toml")
+    reading = read_route(said, WORLDS / "research_center.toml", LAB, language=german)
+    assert reading.is_understood and end_of(reading) == "library"
+    assert main(["parse", said, "--world", "research_center", "--start", LAB, "--lexicon", str(german) + "l"]) == 2
+
+
 # -- directions ------------------------------------------------------------------------------------------------------
 
 @SPEEDY

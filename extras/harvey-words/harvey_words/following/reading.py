@@ -14,6 +14,7 @@ from harvey_words.following.word_follower import WordFollower
 from harvey_words.following.word_map import Point, WordMap
 from harvey_words.following.word_places import State
 from harvey_words.reading.acts import read_acts
+from harvey_words.reading.lexicon import OWN_FILE
 from harvey_words.reading.told_acts import Act
 from harvey_words.reading.word_clauses import read_clauses
 from world_models.building.world import World
@@ -106,7 +107,7 @@ def _tree_data(node: Any) -> Any:
 
 
 def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: str | Sequence[float],
-               heading_deg: float | None = None) -> Reading:
+               heading_deg: float | None = None, language: str | PathLike[str] = OWN_FILE) -> Reading:
     """Read a text about a way.
 
     Args:
@@ -114,12 +115,16 @@ def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: s
         world: the model of the building, its file, or a map that was made of it.
         start: a locale, a door or a thing by name, or x and y [m, world].
         heading_deg: which way the body faces, counter-clockwise from the world's x; None: every way is possible.
+        language: the file of its lexicon, where the map does not bring one.
 
     Raises:
         RouteError: the world has no such start.
+        LexiconError: the lexicon cannot be used.
         WorldError: the file cannot be read.
     """
-    plan = world if isinstance(world, WordMap) else WordMap(world if isinstance(world, World) else load_world(world))
+    if not isinstance(world, WordMap):
+        world = WordMap(world if isinstance(world, World) else load_world(world), language)
+    plan = world
     begin = _begin(plan, start, heading_deg)
     tree, clauses = read_clauses(plan.lexicon.read(text))
     acts = read_acts(clauses)

@@ -9,10 +9,11 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from os import PathLike
 
 import numpy as np
 
-from harvey_words.reading.lexicon import Lexicon, lexicon_data
+from harvey_words.reading.lexicon import OWN_FILE, Lexicon, lexicon_data
 from world_models.building.geometry.faces import Face
 from world_models.building.locales import WORDS_OF, Doorway, Locale
 from world_models.building.world import World, words_about, words_of
@@ -97,13 +98,14 @@ def is_along(one: float, other: float, within: float = 0.8) -> bool:
 class WordMap:
     """What can be said of a world."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, language: str | PathLike[str] = OWN_FILE) -> None:
+        """``language``: the file of its lexicon. Raises LexiconError."""
         self.world = world
         named: list[Collection[str]] = [words_about(locale) for locale in world.locales.values()]
         named += [words_of(said) for locale in world.locales.values()
                   for said in locale.properties.get(WORDS_OF, {}).values()]
         named += [words_of(name) for name in (*_door_names(world), *(f"{one.kind} {one.name}" for one in world.things))]
-        self.lexicon = Lexicon(lexicon_data(), [[word for word in words if len(word) > 1] for words in named])
+        self.lexicon = Lexicon(lexicon_data(language), [[word for word in words if len(word) > 1] for words in named])
         self._surfaces: dict[str, list[Face]] = {}
         for face in world.faces:
             for depth in range(1, face.name.count("/") + 2):
