@@ -47,8 +47,7 @@ class _Reader:
             pass  # "to the end, four blocks"
         elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
-        elif verbs == {"see"} and not self.acts and not wheres and [one.is_door and bool(one.names) for one in things] == [
-                True]:
+        elif verbs == {"see"} and not (self.acts or wheres) and len(things) == 1 and things[0].is_door and things[0].names:
             self.goals.append(Act("find", what=things[0]))  # "find Allen's office", and then how
         elif "goal" in verbs and (things or wheres) and not self._has_way():
             self.goals += [Act("see", what=one) for one in (*things, *(one for _, one in wheres)) if one.names]
@@ -229,7 +228,7 @@ class _Reader:
         halls = [thing for thing in things if thing.is_stretch]
         counted = next((thing.place for thing in things if "unit" in thing.heads), math.inf)
         onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch
-                and not (meaning == "to" and one.place > counted)]  # "right one block to the blue hall" is to walk there
+                and not (meaning == "to" and one.place > counted)]  # "right one block to the blue hall" walks there
         at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
               and (one.heads or one.names)]
         begin = [meaning for meaning, one in wheres if meaning in ("past", "before") or one in onto][:1]
@@ -502,9 +501,9 @@ def _correct(clauses: Sequence[Clause]) -> list[Clause]:
     is_fix = is_aside = False
     for clause in clauses:
         verbs = {part.meaning for part in clause.parts if part.sort == "verb"}
-        if kept and clause.end != "but" and [part.meaning for part in clause.parts[:1]] == ["not"] and not verbs or (
-                is_aside and verbs == {"be"} and not any(word.sort == "COUNT" for part in clause.parts
-                                                         for word in part.words)):
+        counts = any(word.sort == "COUNT" for part in clause.parts for word in part.words)
+        is_denial = [part.meaning for part in clause.parts[:1]] == ["not"] and clause.end != "but" and not verbs
+        if (kept and is_denial) or (is_aside and verbs == {"be"} and not counts):
             is_aside = clause.end == "comma"
             continue  # "the second door, not the first, that is Allen's"
         is_aside = is_aside and not clause.parts

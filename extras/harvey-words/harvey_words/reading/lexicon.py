@@ -122,7 +122,8 @@ class Lexicon:
                 before in roles["pointing"] or self._sort(before) in ("COUNT", "MOD")))
         if meaning != "it":
             return False
-        after = self._longest(pieces, place + 1)[1] if place + 1 < len(pieces) and pieces[place] not in roles["pronoun"] else ""
+        is_apart = place + 1 == len(pieces) or pieces[place] in roles["pronoun"]
+        after = "" if is_apart else self._longest(pieces, place + 1)[1]
         return after in ("HEAD", "THING", "MOD", "COUNT") or not (
             self._sort(before) == "PREP" or before in roles["taking"])
 
@@ -150,7 +151,8 @@ class Lexicon:
 
     def meanings(self, text: str) -> frozenset[str]:
         """What the words of a name or a description in the model mean, phrases before single words."""
-        pieces = [piece for piece in split_text(text, self._rewrites) if piece not in (".", ",") and not piece.isdigit()]
+        split = split_text(text, self._rewrites)
+        pieces = [piece for piece in split if piece not in (".", ",") and not piece.isdigit()]
         found: set[str] = set()
         place = 0
         while place < len(pieces):
