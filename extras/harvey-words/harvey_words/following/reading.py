@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from lark import Tree
@@ -107,7 +108,7 @@ def _tree_data(node: Any) -> Any:
 
 
 def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: str | Sequence[float],
-               heading_deg: float | None = None, language: str | PathLike[str] = OWN_FILE) -> Reading:
+               heading_deg: float | None = None, language: str | Path = OWN_FILE) -> Reading:
     """Read a text about a way.
 
     Args:

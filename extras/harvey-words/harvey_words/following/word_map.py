@@ -9,7 +9,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from os import PathLike
+from pathlib import Path
 
 import numpy as np
 
@@ -98,7 +98,7 @@ def is_along(one: float, other: float, within: float = 0.8) -> bool:
 class WordMap:
     """What can be said of a world."""
 
-    def __init__(self, world: World, language: str | PathLike[str] = OWN_FILE) -> None:
+    def __init__(self, world: World, language: str | Path = OWN_FILE) -> None:
         """``language``: the file of its lexicon. Raises LexiconError."""
         self.world = world
         named: list[Collection[str]] = [words_about(locale) for locale in world.locales.values()]

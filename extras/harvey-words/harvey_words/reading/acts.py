@@ -47,7 +47,8 @@ class _Reader:
             pass  # "to the end, four blocks"
         elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
-        elif verbs == {"see"} and not (self.acts or wheres) and len(things) == 1 and things[0].is_door and things[0].names:
+        elif verbs == {"see"} and not (self.acts or wheres or things[1:]) and things[:1] and (
+                things[0].is_door and things[0].names):
             self.goals.append(Act("find", what=things[0]))  # "find Allen's office", and then how
         elif "goal" in verbs and (things or wheres) and not self._has_way():
             self.goals += [Act("see", what=one) for one in (*things, *(one for _, one in wheres)) if one.names]

@@ -10,7 +10,6 @@ import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -211,7 +210,7 @@ def edit_distance(one: str, other: str, most: int) -> int:
 
 
 @cache
-def lexicon_data(path: str | PathLike[str] = OWN_FILE) -> Mapping[str, Any]:
+def lexicon_data(path: str | Path = OWN_FILE) -> Mapping[str, Any]:
     """The file of a language. Raises LexiconError, naming the file."""
     try:
         data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
