@@ -32,24 +32,24 @@ class _Reader:
     side: str = ""
     goals: list[Act] = field(default_factory=list)
     notes_on: bool = False
-    ahead: int = 0
+    listed: str = ""
 
     def read(self, clause: Clause) -> None:
         """Add the acts of one clause."""
-        self.ahead = 0 if clause.parts else self.ahead
         parts = clause.parts
         verbs = {part.meaning for part in parts if part.sort == "verb"}
         verbs |= {"be"} if verbs & {"with", "meet", "there", "stand"} else set()
         things, ways, wheres = self._collect(parts, verbs)
+        if self.listed and things and all(part.sort == "thing" for part in parts):
+            things, wheres = [], [(self.listed, thing) for thing in things]  # "after the library and the mail room"
+        is_list = clause.end == "and" and len(parts) == 1 and parts[0].meaning in RELATIONS
+        self.listed = parts[0].meaning if is_list else ""
         begun, before = len(self.acts), self.acts[-1] if self.acts else None
-        if not verbs and before and before.until and "end" in before.until.heads and not ways and things and all(
-                "unit" in thing.heads for thing in things):
-            pass  # "to the end, four blocks"
-        elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
+        if self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
-        elif verbs == {"see"} and not (self.acts or wheres or things[1:]) and things[:1] and (
-                things[0].is_door and things[0].names):
-            self.goals.append(Act("find", what=things[0]))  # "find Allen's office", and then how
+        elif verbs in ({"see"}, {"be"}) and things and not (self.acts or wheres or ways) and all(
+                one.is_door and (one.names or "be" in verbs) for one in things):
+            self.goals.append(Act("find", what=_merge(things)))  # "find Allen's office", and then how
         elif "goal" in verbs and (things or wheres) and not self._has_way():
             self.goals += [Act("see", what=one) for one in (*things, *(one for _, one in wheres)) if one.names]
         elif "exit" in verbs or (not verbs and not self._has_way() and [
@@ -80,6 +80,10 @@ class _Reader:
         elif "halt" in verbs:
             self._go(things, ways, [("to" if one.heads & {"unit"} or meaning == "at" else meaning, one)
                                     for meaning, one in wheres], until=True)
+        elif verbs == {"be"} and not things and [by for by, one in wheres[:1] if one.heads & POINTS] == ["to"]:
+            self._go([], ways, wheres)  # "and to the very end, where the lamp is"
+        elif verbs >= {"reach", "pass"}:
+            self._go(things, ways, wheres, passing=True)  # "walk until you have passed the lamp"
         elif "reach" in verbs and "be" not in verbs:
             self._go(things, ways, wheres, until=True)
         elif verbs & {"go", "pass"} and not (verbs & {"be"} and any(thing.is_door for thing in things)):
@@ -139,20 +143,15 @@ class _Reader:
                 ways.append(side)
             located = False
         return [self._resolve(thing, verbs) for thing in things], ways, [
-            (self._by(meaning, one), self._resolve(one, {meaning})) for meaning, one in wheres]
+            (meaning if meaning != "by" else "along" if one.is_stretch else "past", self._resolve(one, {meaning}))
+            for meaning, one in wheres]
 
     def _read_side(self, part: Part) -> str:
         """``The same side``, ``the other side``: left or right where that was said before."""
         meanings = {word.meaning for word in part.words}
-        if meanings == {"side"} and part.meaning == "on" and self.acts and self.acts[-1].sort == "turn":
-            return self.acts[-1].way  # "turn left, there is a door on that side"
         if not ("side" in meanings and meanings <= {"side", *SAME}) or len(meanings) != 2:
             return ""
         return "same" if "same" in meanings else "other"
-
-    def _by(self, meaning: str, thing: ThingWords) -> str:
-        """By a hall is along it, by a thing past it."""
-        return meaning if meaning != "by" else "along" if thing.is_stretch else "past"
 
     def _it(self) -> ThingWords:
         return self.last_thing or ThingWords()
@@ -306,11 +305,6 @@ class _Reader:
         halls = [one for one in (*things, *(one for _, one in wheres)) if one.is_stretch]
         if halls and not (what and what[0].is_door):
             self._turn(halls, ways, [(meaning, one) for meaning, one in wheres if one is not halls[0]])
-        elif not what and [meaning for meaning, _ in wheres] == ["past"] and self._it().is_door:
-            # "skip a door and take the one after"
-            last = self.acts[-1].past[-1:] if self.acts else ()
-            self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), count="1", side=last[0].side) if last
-                                 else ThingWords(frozenset(("door",)), relations=tuple(wheres)), enters=True))
         elif not what:
             self._terse(things, ways, wheres)
         else:
@@ -336,11 +330,9 @@ class _Reader:
         if blocks and len(things) > 1:  # "an easel one block in front of you"
             side = side or blocks[0].side
             things = [thing for thing in things if "unit" not in thing.heads]
-            self.ahead = blocks[0].number if side in ("ahead", "") and not verbs & {"there", "see"} else 0
         doors = [thing for thing in things if thing.is_door or (
             thing.count and thing.side and not thing.heads and not thing.names)]
-        if doors or not things:
-            doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
+        doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
         if doors:
             goal = _merge(doors)
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
@@ -372,7 +364,10 @@ class _Reader:
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS and one.text)
         side = next((one.side for _, one in wheres if one.side), "")
         last = self.acts[-1] if self.acts else None
-        if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
+        if last is None and things and wheres and not ways and all(
+                meaning in ("at", "in") and one.heads & POINTS for meaning, one in wheres):  # "the lamp at the corner"
+            self.acts.append(Act("find", what=_merge([wheres[0][1], *(one for one in things if not one.heads)])))
+        elif not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
         elif things and things[0].heads == {"side"}:
             self.side = things[0].count if things[0].count in SAME else ""  # "same side as this room, the next door"
@@ -469,9 +464,6 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)
-    if reader.ahead and reader.acts[-1].sort == "see" and not reader.goals:  # "the lamp is one block ahead", no more
-        what = reader.acts.pop().what
-        reader.acts.append(Act("go", until=what and replace(what, side=""), units=reader.ahead))
     if reader.acts and reader.acts[-1].sort == "find" == (reader.goals or reader.acts)[-1].sort and reader.goals:
         what, goal = reader.acts.pop().what, reader.goals.pop()  # "find Allen's office; it is the next door"
         reader.goals.append(replace(goal, what=what and goal.what and _merge((goal.what, what))))
