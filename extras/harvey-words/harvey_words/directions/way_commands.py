@@ -39,7 +39,7 @@ def _add_directions(parser: ArgumentParser) -> None:
 
 def _parse(args: Namespace) -> int:
     from harvey_words.following.reading import RouteError, read_route
-    from harvey_words.reading.lexicon import OWN_FILE, LexiconError
+    from harvey_words.reading.lexicon import OWN_FILE
 
     if len(args.text) > MOST_CHARACTERS:
         raise BadInput(f"TEXT: expected at most {MOST_CHARACTERS} characters, got {len(args.text)}")
@@ -49,8 +49,6 @@ def _parse(args: Namespace) -> int:
         reading = read_route(args.text, load_file(args.world, []), args.start, args.heading, args.lexicon or OWN_FILE)
     except RouteError as error:
         raise BadInput(f"--start: {error}") from error
-    except LexiconError as error:
-        raise BadInput(f"--lexicon: {error}") from error
     print(json.dumps(reading.as_data(), indent=1) if args.json else "\n".join(tell(reading)))
     return 0 if reading.is_understood else 1
 

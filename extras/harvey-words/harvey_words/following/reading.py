@@ -125,9 +125,8 @@ def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: s
         LexiconError: the lexicon cannot be used.
         WorldError: the file cannot be read.
     """
-    if not isinstance(world, WordMap):
-        world = WordMap(world if isinstance(world, World) else load_world(world), language)
-    plan = world
+    plan = world if isinstance(world, WordMap) else WordMap(
+        world if isinstance(world, World) else load_world(world), language)
     begin = _begin(plan, start, heading_deg)
     tree, clauses = read_clauses(plan.lexicon.read(text))
     acts = read_acts(clauses)

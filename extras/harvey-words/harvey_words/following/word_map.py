@@ -136,7 +136,8 @@ class WordMap:
         x, y = turn.T @ ((low + high) / 2)
         length, width = ((high - low) / 2).tolist()
         doors = self.world.doorways_of(locale.name)
-        meanings = frozenset().union(*map(self.lexicon.meanings, _texts(locale)))
+        texts = [locale.name, locale.kind, *(str(one) for one in locale.properties.values() if isinstance(one, str))]
+        meanings = frozenset().union(*map(self.lexicon.meanings, texts))
         kind = self.lexicon.meanings(f"{locale.kind} {locale.name}")
         is_hall = bool(kind & HALL_WORDS) or length > LONG_RATIO * width or (
             bool(doors) and all(self._is_plain(locale.name, door) for door in doors))
@@ -213,8 +214,8 @@ class WordMap:
                         and abs(left) < WALKED_M and feature.outward is not None
                         and self.areas[feature.beyond].is_hall and feature.sort == "opening"):
                     onward = ahead, feature
-            gap_m = wall_gap(area, here, heading)
             if onward is None or onward[1].beyond in seen or len(seen) > 200:
+                gap_m = offsets(here, heading, area.middle)[0] + area.half[0 if is_level(area.axis, heading) else 1]
                 yield NamedSight(None, begin_m + gap_m, 0.0, "ahead", area.name)
                 return
             begin_m, here, area = begin_m + onward[0], onward[1].at, self.areas[onward[1].beyond or ""]
@@ -258,12 +259,6 @@ def is_level(one: float, other: float) -> bool:
     return is_along(one, other) or is_along(one, other + math.pi)
 
 
-def wall_gap(area: Area, here: Point, heading: float) -> float:
-    """How far the end of an area is ahead [m]."""
-    ahead, _ = offsets(here, heading, area.middle)
-    return ahead + area.half[0 if is_level(area.axis, heading) else 1]
-
-
 def _side(heading: float, feature: NamedFeature, left_m: float) -> str:
     if feature.outward is not None:
         for side, turn in (("ahead", 0.0), ("left", math.pi / 2), ("right", -math.pi / 2), ("behind", math.pi)):
@@ -275,10 +270,6 @@ def _side(heading: float, feature: NamedFeature, left_m: float) -> str:
 def _door_names(world: World) -> set[str]:
     shut = {face.name.split("/")[1] for face in world.faces if face.name.endswith("/leaf")}
     return shut | {door.name for door in world.doorways} | {link.name for link in world.links}
-
-
-def _texts(locale: Locale) -> list[str]:
-    return [locale.name, locale.kind, *(str(value) for value in locale.properties.values() if isinstance(value, str))]
 
 
 def _textures(faces: Iterable[Face]) -> frozenset[str]:

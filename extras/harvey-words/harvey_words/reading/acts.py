@@ -102,9 +102,8 @@ class _Reader:
         begun = len(self.acts) if begun and self.acts[-1] is before else begun
         self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
         self.wants_orient = clause.end == "so"
-        if parts:
-            text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
-            self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
+        text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
+        self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
 
     def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[list[ThingWords], list[str], Wheres]:
         """Things, ways, and prepositions with their things; sides belong to the thing before them."""

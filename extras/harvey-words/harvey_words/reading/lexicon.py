@@ -13,6 +13,8 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from harvey.errors import BadInput
+
 CLASSES = ("VERB", "WAY", "PREP", "SEP", "NOT", "COUNT", "HEAD", "THING", "MOD")
 LONGEST = 5
 """Words of the longest phrase."""
@@ -21,10 +23,9 @@ MOST_WORDS = 300
 SHORT, LONG = 4, 8
 """Letters of a word that may have one wrong, and two."""
 OWN_FILE = Path(__file__).with_name("lexicon.toml")
-Phrase = tuple[str, ...]
 
 
-class LexiconError(ValueError):
+class LexiconError(BadInput):
     """A file of a language that cannot be used."""
 
 
@@ -54,7 +55,7 @@ class Lexicon:
         """``named``: of each thing of the building, the words by which it is named there."""
         called = {frozenset(words) for words in named}
         names = frozenset[str]().union(*called)
-        self.phrases: dict[Phrase, tuple[str, str]] = {
+        self.phrases: dict[tuple[str, ...], tuple[str, str]] = {
             tuple(phrase.split()): (sort, meaning)
             for sort in CLASSES for meaning, phrases in data[sort].items() for phrase in phrases}
         self.phrases |= {(colour,): ("MOD", colour) for colour in data["COLOURS"]}
