@@ -35,13 +35,7 @@ def test_what_is_not_understood_is_named(text: str) -> None:
         read_wanted(text)
 
 
-@pytest.mark.parametrize(("text", "places", "told"), [
-    ("go to the lab, then turn left and it is the second door", ["lab"], ["turn left and it is the second door"]),
-    ("Fetch the book, then turn left, second door", ["home of", "", "start"], ["turn left, second door"]),
-    ("Leave the lab. Go past the sign. Then come back.", ["start"], ["Leave the lab. Go past the sign"]),
-    ("Take the teal door and go to the end", [], ["Take the teal door and go to the end"]),
-    ("Go to the north hall and take the book to Allen", ["north hall", "home of", "", "allen", ""], []),
-])
+@pytest.mark.parametrize(("text", "places", "told"), TEXTS["told"])
 def test_a_way_in_a_task_is_told_apart_from_places(text: str, places: list[str], told: list[str]) -> None:
     steps = read_wanted(text)
     assert [step.phrase for step in steps if not step.is_told] == places

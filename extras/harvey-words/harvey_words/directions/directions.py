@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 from harvey_words.following.reading import SURE, Reading, RouteError, find_start, read_route
-from harvey_words.following.word_doors import OPPOSITE_M
 from harvey_words.following.word_follower import WordFollower
 from harvey_words.following.word_map import (
     Area,
@@ -26,7 +25,7 @@ from harvey_words.following.word_map import (
     offsets,
     turned,
 )
-from harvey_words.following.word_places import HERE_M, NEAR_M, State
+from harvey_words.following.word_places import HERE_M, NEAR_M, OPPOSITE_M, State
 from harvey_words.reading.lexicon import lexicon_data
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth")
@@ -36,8 +35,6 @@ OUT_M = 2.5
 """So far out of a door one only comes into the hall."""
 ROUNDS = 2
 """How often all steps are gone through for a better wording."""
-Wordings = list[str]
-"""What can be said of one step, the shortest first."""
 Spot = tuple[str, Point]
 """A locale, and a place in it [m, world]."""
 ROOM_COST_M = 40.0
@@ -111,8 +108,8 @@ class _Teller:
         self._phrases = {meaning: said[0] for sort in ("MOD", "THING") for meaning, said in data[sort].items()}
         self._phrases |= {colour: colour for colour in data["COLOURS"]}
 
-    def tell(self, begin: Spot, way: Sequence[NamedFeature], end: Spot, heading: float | None) -> Iterator[Wordings]:
-        """The wordings of each step."""
+    def tell(self, begin: Spot, way: Sequence[NamedFeature], end: Spot, heading: float | None) -> Iterator[list[str]]:
+        """The wordings of each step, the shortest first."""
         state = State(*begin, heading or 0.0)
         is_known = heading is not None
         while way or state.locale == end[0]:
@@ -149,7 +146,7 @@ class _Teller:
         assert door.outward is not None and door.beyond is not None
         return State(door.beyond, moved(door.at, door.outward, 0.5), door.outward, came=door.name)
 
-    def _tell_exit(self, door: NamedFeature) -> Wordings:
+    def _tell_exit(self, door: NamedFeature) -> list[str]:
         room = self.plan.areas[door.locale]
         others = [one for one in room.features if one.is_open and one is not door]
         if not others:
@@ -158,7 +155,7 @@ class _Teller:
                 *(f"Leave the room by the door to the {word} hall."
                   for word in self._words(door.meanings, [one.meanings for one in others])), "Leave the room."]
 
-    def _tell_turn(self, state: State, leg: WayLeg, is_known: bool) -> Wordings:
+    def _tell_turn(self, state: State, leg: WayLeg, is_known: bool) -> list[str]:
         there = State(*leg.begin, leg.heading)
         ways = self.follower.ways(there)
         own = self.follower.hall_ahead(there)
@@ -189,7 +186,7 @@ class _Teller:
             things = self._things(replace(state, heading=turned(there, 0.0)))
             yield from (f"Turn so that the {name} is {place}." for _, name in things)
 
-    def _tell_walk(self, state: State, leg: WayLeg, onward: WayLeg | None) -> Wordings:
+    def _tell_walk(self, state: State, leg: WayLeg, onward: WayLeg | None) -> list[str]:
         """How far: to a thing, to a hall that leaves, so many blocks, to the end."""
         length = offsets(state.at, state.heading, leg.end[1])[0]
         said: list[str] = []
@@ -209,7 +206,7 @@ class _Teller:
         return [*into_hall, *said, *([""] if onward is not None and said else []),
                 f"Go forward {metres} metre{'s' * (metres > 1)}."]
 
-    def _tell_door(self, state: State, door: NamedFeature) -> Wordings:
+    def _tell_door(self, state: State, door: NamedFeature) -> list[str]:
         """Which door: by its rank on its side, by a mark before it, by what is written on it."""
         doors = [sight for sight in self.follower.sights(state) if sight.feature is not None
                  and sight.feature.sort == "door" and sight.side != "behind" and sight.feature.name != state.came

@@ -27,6 +27,7 @@ def _add_both(parser: ArgumentParser) -> None:
 def _add_parse(parser: ArgumentParser) -> None:
     parser.add_argument("text", metavar="TEXT", help="the way, in your words")
     parser.add_argument("--start", metavar="PLACE", required=True, help="a room, hall, door or thing, or X,Y in metres")
+    parser.add_argument("--lexicon", metavar="FILE", help="the words of another language (English)")
     _add_both(parser)
 
 
@@ -38,13 +39,14 @@ def _add_directions(parser: ArgumentParser) -> None:
 
 def _parse(args: Namespace) -> int:
     from harvey_words.following.reading import RouteError, read_route
+    from harvey_words.reading.lexicon import OWN_FILE
 
     if len(args.text) > MOST_CHARACTERS:
         raise BadInput(f"TEXT: expected at most {MOST_CHARACTERS} characters, got {len(args.text)}")
     if args.heading is not None and not -720.0 <= args.heading <= 720.0:
         raise BadInput(f"--heading: expected degrees from -720 to 720, got {args.heading}")
     try:
-        reading = read_route(args.text, load_file(args.world, []), args.start, args.heading)
+        reading = read_route(args.text, load_file(args.world, []), args.start, args.heading, args.lexicon or OWN_FILE)
     except RouteError as error:
         raise BadInput(f"--start: {error}") from error
     print(json.dumps(reading.as_data(), indent=1) if args.json else "\n".join(tell(reading)))
@@ -75,7 +77,8 @@ def tell(reading: Reading) -> Iterator[str]:
         yield "Which way? Nothing in this text tells of one."
         return
     for act in reading.acts:
-        yield f"  {act.sort:6} {act.way:6} {act.text}".rstrip()
+        side = act.way or (act.what.side if act.what else "")
+        yield f"  {act.sort:6} {side:6} {act.text}".rstrip()
     end, rivals = reading.end, reading.ends[1:4]
     yield f"{'It leads to' if reading.is_understood else 'Perhaps to'} {name_end(end)} ({end.odds:.0%})."
     if rivals and not reading.is_understood:

@@ -15,17 +15,15 @@ from experiments.drives import Trial
 from experiments.report import Report
 from harvey.campaign.mission_task import Task
 from harvey_words.directions.directions import write_directions
-from harvey_words.experiments.instructions import OTHERS, read_paragraphs
 from harvey_words.experiments.told_routes import Told, tell_rooms
 from harvey_words.following.word_map import WordMap
 from world_models.entries import Goal
 from world_models.files.world_files import WORLDS, load_world
 
 MISSIONS, QUICK_MISSIONS = 100, 10
-FRESH = OTHERS["fresh, then of development"]
 AT_GOAL_M = 0.5
 """True distance from the last goal within which a mission ended at it."""
-TOLD, DIRECTIONS, PEOPLE = "told by the generator", "directions", "fresh paragraphs"
+TOLD, DIRECTIONS = "told by the generator", "directions"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +51,6 @@ def draw_way(trial: Trial) -> tuple[str, Told]:
     """A world, and a way in it."""
     rng = np.random.default_rng([trial.seed, 64])
     centre = "research-center" if trial.row != DIRECTIONS or rng.random() < 0.7 else "two-ways"
-    if trial.row == PEOPLE:
-        told = [(plan, Told(start, end, text)) for _, plan, start, _, end, text in read_paragraphs(FRESH)
-                if end in plan.areas and not plan.areas[end].is_hall]
-        plan, told_way = told[trial.seed % len(told)]
-        return plan.world.name, told_way
     plan = WordMap(load_world(WORLDS / f"{centre.replace('-', '_')}.toml"))
     rooms = sorted(name for name, area in plan.areas.items() if not area.is_hall)
     while True:
@@ -95,7 +88,7 @@ FIGURES: Mapping[str, drives.Figure[WayEnd]] = {
 
 def run(quick: bool, seed: int, missions: int | None = None) -> Report:
     """Drive so many ways, a row after the other."""
-    first, rows = drives.first_seed(seed), [TOLD, DIRECTIONS, *([PEOPLE] if FRESH.exists() else [])]
+    first, rows = drives.first_seed(seed), [TOLD, DIRECTIONS]
     trials = [Trial(rows[k % len(rows)], first + k)
               for k in range(missions or (QUICK_MISSIONS if quick else MISSIONS))]
     driven = drives.drive_all("driven-ways", drive, trials, WayEnd, quick=quick, seed=seed, missions=missions,

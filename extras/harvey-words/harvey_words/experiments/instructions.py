@@ -14,8 +14,7 @@ import numpy as np
 from experiments.generated.floors import generated_floor
 from experiments.report import Cell, Report
 from harvey_words.directions.directions import write_directions
-from harvey_words.experiments.mazes import Hall, Node, write_maze
-from harvey_words.experiments.told_routes import Told, draw_maze, tell_maze, tell_rooms
+from harvey_words.experiments.told_routes import Hall, Node, Told, draw_maze, tell_maze, tell_rooms, write_maze
 from harvey_words.following.reading import RouteError, read_route
 from harvey_words.following.word_map import WordMap
 from harvey_words.reading.lexicon import split_text
@@ -28,7 +27,8 @@ TOLD_ON_ONE = 10
 """Routes on one building before another is drawn."""
 PARAGRAPHS = Path(str(files("harvey_words"))).parent / "tests" / "data" / "paragraphs.txt"
 OTHERS = {"of development": PARAGRAPHS.with_name("development.txt"),
-          "fresh, then of development": PARAGRAPHS.with_name("fresh.txt")}
+          "fresh, then of development": PARAGRAPHS.with_name("fresh.txt"),
+          "blind, then of development": PARAGRAPHS.with_name("blind.txt")}
 COLUMNS = ("what", "texts", "arrive", "ask, the right place first", "ask, another first", "silently elsewhere",
            "ms a sentence")
 HOW = ("takes right", "asks right", "asks another", "takes another")

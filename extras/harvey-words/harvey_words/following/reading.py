@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from lark import Tree
@@ -14,6 +15,7 @@ from harvey_words.following.word_follower import WordFollower
 from harvey_words.following.word_map import Point, WordMap
 from harvey_words.following.word_places import State
 from harvey_words.reading.acts import read_acts
+from harvey_words.reading.lexicon import OWN_FILE
 from harvey_words.reading.told_acts import Act
 from harvey_words.reading.word_clauses import read_clauses
 from world_models.building.world import World
@@ -71,13 +73,15 @@ class Reading:
     Attributes:
         tree: of the text, as the grammar has it; acts: what it asks to do and to see.
         ends: where it may lead, best first; unused: phrases that fitted nothing in the best reading.
+        is_goal_there: whether the thing that is named last is at the best end.
     """
 
     text: str
     tree: Tree[Any]
     acts: tuple[Act, ...]
     ends: tuple[RouteEnd, ...]
-    unused: tuple[str, ...] = field(default=())
+    unused: tuple[str, ...] = ()
+    is_goal_there: bool = False
 
     @property
     def end(self) -> RouteEnd | None:
@@ -87,7 +91,7 @@ class Reading:
     @property
     def is_understood(self) -> bool:
         """Whether the best end is sure enough to go there without asking."""
-        return bool(self.acts) and self.end is not None and self.end.odds >= SURE
+        return bool(self.acts) and self.end is not None and self.end.odds >= SURE and self.is_goal_there
 
     def as_data(self) -> dict[str, Any]:
         """For JSON: the same text on the same world gives the same, byte for byte."""
@@ -106,7 +110,7 @@ def _tree_data(node: Any) -> Any:
 
 
 def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: str | Sequence[float],
-               heading_deg: float | None = None) -> Reading:
+               heading_deg: float | None = None, language: str | Path = OWN_FILE) -> Reading:
     """Read a text about a way.
 
     Args:
@@ -114,19 +118,24 @@ def read_route(text: str, world: World | str | PathLike[str] | WordMap, start: s
         world: the model of the building, its file, or a map that was made of it.
         start: a locale, a door or a thing by name, or x and y [m, world].
         heading_deg: which way the body faces, counter-clockwise from the world's x; None: every way is possible.
+        language: the file of its lexicon, where the map does not bring one.
 
     Raises:
         RouteError: the world has no such start.
+        LexiconError: the lexicon cannot be used.
         WorldError: the file cannot be read.
     """
-    plan = world if isinstance(world, WordMap) else WordMap(world if isinstance(world, World) else load_world(world))
+    plan = world if isinstance(world, WordMap) else WordMap(
+        world if isinstance(world, World) else load_world(world), language)
     begin = _begin(plan, start, heading_deg)
     tree, clauses = read_clauses(plan.lexicon.read(text))
     acts = read_acts(clauses)
-    states = WordFollower(plan).follow(begin, acts) if acts else []
+    follower = WordFollower(plan)
+    states = follower.follow(begin, acts) if acts else []
     ends = _weigh_ends(states)
     misfits = states[0].misfits if states else ()
-    return Reading(text, tree, tuple(acts), ends, tuple(acts[number].text for number in misfits if number < len(acts)))
+    unused = tuple(acts[number].text for number in misfits if number < len(acts))
+    return Reading(text, tree, tuple(acts), ends, unused, bool(states) and follower.is_goal_there(states[0], acts[-1]))
 
 
 def _begin(plan: WordMap, start: str | Sequence[float], heading_deg: float | None) -> list[State]:

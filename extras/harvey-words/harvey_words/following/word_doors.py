@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
@@ -10,6 +9,7 @@ from harvey_words.following.word_map import NamedSight, is_along, moved, offsets
 from harvey_words.following.word_places import (
     AGAIN,
     MISFIT,
+    OPPOSITE_M,
     TURNS,
     UNKNOWN_HEAD,
     WORST,
@@ -20,6 +20,8 @@ from harvey_words.following.word_places import (
 )
 from harvey_words.reading.told_acts import ThingWords
 
+NO_DEAD_END = -3.0
+"""What is called a dead end, and has another way out."""
 UNTOLD = -4.0
 """A goal out of sight to which no way is told."""
 OPEN_ONLY = -1.8
@@ -28,8 +30,6 @@ BEHIND = 1.5
 """Off for a thing that lies behind when the walk begins, where a door after it is meant."""
 BEFORE_M = 4.0
 """A door before a thing that was reached lies no further back."""
-OPPOSITE_M = 0.3
-"""What is hardly further along than the door one comes out of lies opposite, and is not counted."""
 
 
 class WordDoors(WordPlaces):
@@ -40,8 +40,7 @@ class WordDoors(WordPlaces):
         if what.heads & {"crossing", "corner", "end"} and not what.heads & {"door"}:
             yield from self._anywhere(state, what)
             return
-        at_door = bool(state.came) and state.begun is not None and math.dist(state.begun, state.at) < 0.1
-        if at_door and what.side in ("left", "right") and not any(
+        if state.is_at_door and what.side in ("left", "right") and not any(
                 is_along(way, state.heading) for way in self.ways(state)):
             # come out of a door, what lies to the left lies in that direction, on either side of the hall
             there = replace(state, heading=turned(state.heading, TURNS[what.side]), odds=state.odds - 0.5)
@@ -75,7 +74,7 @@ class WordDoors(WordPlaces):
         """A crossing or end of halls, each word of which is said of one that leaves here or of what stands here."""
         ways = self.ways(state)
         halls = [self.hall_ahead(replace(state, heading=way)) for way in ways]
-        fit = self.fit_place(state, what, halls)
+        fit = self.fit_place(state, what, halls) + NO_DEAD_END * ("dead-end" in what.heads and len(ways) > 1)
         if fit > WORST:
             yield replace(state, odds=state.odds + fit)
 
@@ -85,7 +84,7 @@ class WordDoors(WordPlaces):
         for facing in facings:
             doors = [sight for sight in self.sights(facing) if sight.feature is not None
                      and sight.feature.sort == "door" and sight.side != "behind"
-                     and sight.ahead_m > (OPPOSITE_M if facing.came and facing.begun == facing.at else least)
+                     and sight.ahead_m > (OPPOSITE_M if facing.is_at_door else least)
                      and sight.feature.name != facing.came]
             for sight in doors:
                 cost = self._weigh_door(facing, sight, doors, what)
@@ -160,13 +159,14 @@ class WordDoors(WordPlaces):
             fit = self.match.fit(other, mark.feature)
             gap = sight.ahead_m - mark.ahead_m
             walked_m = offsets(state.begun or state.at, state.heading, mark.feature.at)[0]
-            if walked_m > 0.0 and fit > -1.0:
-                fit += 0.7 * AGAIN * rank  # the first of several columns is meant
+            least_m = OPPOSITE_M if state.came and state.begun is not None else -OPPOSITE_M
+            if walked_m > max(least_m, 0.0) and fit > -1.0:
+                fit += AGAIN * rank  # the first of several columns is meant
                 rank += 1
             between = [one for one in doors if one is not sight and one is not mark and one.side == sight.side
                        and min(sight.ahead_m, mark.ahead_m) - 0.05 < one.ahead_m < max(sight.ahead_m, mark.ahead_m)]
             if relation == "past":
-                fit += AGAIN * 1.5 * len(between) - BEHIND * (walked_m < -0.3) if gap > -0.3 else -3.0
+                fit += AGAIN * 1.5 * len(between) - BEHIND * (walked_m < least_m) if gap > -0.3 else -3.0
             elif relation == "before":
                 fit += AGAIN * 1.5 * len(between) if gap < 0.3 else -3.0
             elif relation == "across":

@@ -61,6 +61,14 @@ class WordFollower(WordDoors):
         ended = [new for state in states for new in (self._halt(state) if state.moving else (state,))]
         return best_of(ended, len(ended))
 
+    def is_goal_there(self, state: State, act: Act) -> bool:
+        """Whether a thing that a text names last, and that the building has, is where it ends."""
+        what = act.until if act.sort == "go" else act.what if act.sort == "see" else None
+        if what is None or what.heads or what.side or what.is_door or not any(
+                word.sort == "THING" and word.meaning in self.plan.vocabulary for word in what.names):
+            return True
+        return self.seen_from(state, what) > NOT_SEEN
+
     def _expand(self, state: State, act: Act, is_last: bool) -> Iterator[State]:
         if act.sort in ("turn", "go", "find") and not self.area(state).is_hall:
             for out in self.leave(state, None):  # through rooms, each once

@@ -9,10 +9,11 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from harvey_words.reading.lexicon import Lexicon, lexicon_data
+from harvey_words.reading.lexicon import OWN_FILE, Lexicon, lexicon_data
 from world_models.building.geometry.faces import Face
 from world_models.building.locales import WORDS_OF, Doorway, Locale
 from world_models.building.world import World, words_about, words_of
@@ -97,13 +98,14 @@ def is_along(one: float, other: float, within: float = 0.8) -> bool:
 class WordMap:
     """What can be said of a world."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, language: str | Path = OWN_FILE) -> None:
+        """``language``: the file of its lexicon. Raises LexiconError."""
         self.world = world
         named: list[Collection[str]] = [words_about(locale) for locale in world.locales.values()]
         named += [words_of(said) for locale in world.locales.values()
                   for said in locale.properties.get(WORDS_OF, {}).values()]
         named += [words_of(name) for name in (*_door_names(world), *(f"{one.kind} {one.name}" for one in world.things))]
-        self.lexicon = Lexicon(lexicon_data(), [[word for word in words if len(word) > 1] for words in named])
+        self.lexicon = Lexicon(lexicon_data(language), [[word for word in words if len(word) > 1] for words in named])
         self._surfaces: dict[str, list[Face]] = {}
         for face in world.faces:
             for depth in range(1, face.name.count("/") + 2):
@@ -134,7 +136,8 @@ class WordMap:
         x, y = turn.T @ ((low + high) / 2)
         length, width = ((high - low) / 2).tolist()
         doors = self.world.doorways_of(locale.name)
-        meanings = frozenset().union(*map(self.lexicon.meanings, _texts(locale)))
+        texts = [locale.name, locale.kind, *(str(one) for one in locale.properties.values() if isinstance(one, str))]
+        meanings = frozenset().union(*map(self.lexicon.meanings, texts))
         kind = self.lexicon.meanings(f"{locale.kind} {locale.name}")
         is_hall = bool(kind & HALL_WORDS) or length > LONG_RATIO * width or (
             bool(doors) and all(self._is_plain(locale.name, door) for door in doors))
@@ -211,8 +214,8 @@ class WordMap:
                         and abs(left) < WALKED_M and feature.outward is not None
                         and self.areas[feature.beyond].is_hall and feature.sort == "opening"):
                     onward = ahead, feature
-            gap_m = wall_gap(area, here, heading)
             if onward is None or onward[1].beyond in seen or len(seen) > 200:
+                gap_m = offsets(here, heading, area.middle)[0] + area.half[0 if is_level(area.axis, heading) else 1]
                 yield NamedSight(None, begin_m + gap_m, 0.0, "ahead", area.name)
                 return
             begin_m, here, area = begin_m + onward[0], onward[1].at, self.areas[onward[1].beyond or ""]
@@ -256,12 +259,6 @@ def is_level(one: float, other: float) -> bool:
     return is_along(one, other) or is_along(one, other + math.pi)
 
 
-def wall_gap(area: Area, here: Point, heading: float) -> float:
-    """How far the end of an area is ahead [m]."""
-    ahead, _ = offsets(here, heading, area.middle)
-    return ahead + area.half[0 if is_level(area.axis, heading) else 1]
-
-
 def _side(heading: float, feature: NamedFeature, left_m: float) -> str:
     if feature.outward is not None:
         for side, turn in (("ahead", 0.0), ("left", math.pi / 2), ("right", -math.pi / 2), ("behind", math.pi)):
@@ -273,10 +270,6 @@ def _side(heading: float, feature: NamedFeature, left_m: float) -> str:
 def _door_names(world: World) -> set[str]:
     shut = {face.name.split("/")[1] for face in world.faces if face.name.endswith("/leaf")}
     return shut | {door.name for door in world.doorways} | {link.name for link in world.links}
-
-
-def _texts(locale: Locale) -> list[str]:
-    return [locale.name, locale.kind, *(str(value) for value in locale.properties.values() if isinstance(value, str))]
 
 
 def _textures(faces: Iterable[Face]) -> frozenset[str]:

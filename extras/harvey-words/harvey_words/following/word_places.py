@@ -49,6 +49,8 @@ UNSAID_TURN, UNSAID_BACK, UNSAID_WALK, UNSAID_EXIT = -2.0, -2.6, -1.5, -0.3
 """What is done without being told: turning to the side, turning back, walking on, leaving a room."""
 WRONG_RANK, WRONG_SIDE = -3.5, -4.0
 """Of what has another number, or lies on the other side."""
+OPPOSITE_M = 0.3
+"""What is hardly further along than the door one comes out of lies opposite, and is neither counted nor passed."""
 NEAR_M, HERE_M = 2.6, 1.3
 """What is at a place; what is the same place."""
 LEAST_WAY_M = 1.0
@@ -86,6 +88,11 @@ class State:
     def key(self) -> tuple[object, ...]:
         """What makes two hypotheses one."""
         return (self.locale, round(self.at[0], 1), round(self.at[1], 1), round(self.heading, 2), self.moving, self.door)
+
+    @property
+    def is_at_door(self) -> bool:
+        """Whether one has just come out of a door, and not walked yet."""
+        return bool(self.came) and self.begun is not None and math.dist(self.begun, self.at) < 0.1
 
     def by(self, locale: str, at: Point, mark: str = "") -> tuple[tuple[str, float, float, str], ...]:
         """Its way with one more place."""
@@ -398,7 +405,7 @@ class WordPlaces:
         """The sights that a description may be of: crossings for a crossing or hall, features for the rest."""
         if what.heads & {"crossing", "corner"} or what.is_stretch or not (what.heads or what.names):
             return self.nodes(state)
-        least = 0.3 if self.area(state).is_tile else -0.1
+        least = OPPOSITE_M if self.area(state).is_tile or state.is_at_door else -0.1
         return [sight for sight in self.sights(state) if sight.feature is not None and sight.feature.sort != "opening"
                 and sight.ahead_m > least and sight.side != "behind" and sight.feature.name != state.came
                 and (abs(sight.left_m) < NEAR_M or not self.area(state).is_hall)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -31,24 +32,28 @@ class _Reader:
     side: str = ""
     goals: list[Act] = field(default_factory=list)
     notes_on: bool = False
-    ahead: int = 0
+    listed: str = ""
 
     def read(self, clause: Clause) -> None:
         """Add the acts of one clause."""
-        self.ahead = 0 if clause.parts else self.ahead
         parts = clause.parts
         verbs = {part.meaning for part in parts if part.sort == "verb"}
         verbs |= {"be"} if verbs & {"with", "meet", "there", "stand"} else set()
         things, ways, wheres = self._collect(parts, verbs)
+        if self.listed and things and all(part.sort == "thing" for part in parts):
+            things, wheres = [], [(self.listed, thing) for thing in things]  # "after the library and the mail room"
+        is_list = clause.end == "and" and len(parts) == 1 and parts[0].meaning in RELATIONS
+        self.listed = parts[0].meaning if is_list else ""
         begun, before = len(self.acts), self.acts[-1] if self.acts else None
-        if not verbs and before and before.until and "end" in before.until.heads and not ways and things and all(
-                "unit" in thing.heads for thing in things):
-            pass  # "to the end, four blocks"
-        elif self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
+        if self.wants_orient and (things or wheres) and not verbs & {"turn", "take", "go"}:
             self._orient(things, ways, wheres)
+        elif verbs in ({"see"}, {"be"}) and things and not (self.acts or wheres or ways) and all(
+                one.is_door and (one.names or "be" in verbs) for one in things):
+            self.goals.append(Act("find", what=_merge(things)))  # "find Allen's office", and then how
         elif "goal" in verbs and (things or wheres) and not self._has_way():
             self.goals += [Act("see", what=one) for one in (*things, *(one for _, one in wheres)) if one.names]
-        elif "exit" in verbs:
+        elif "exit" in verbs or (not verbs and not self._has_way() and [
+                (meaning, one.is_door) for meaning, one in wheres] == [("from", True)]):  # "from your door, go left"
             self._exit(things, ways, wheres)
         elif things and self._is_walk_told([], []) and (
                 (self.notes_on and not verbs) or verbs in ({"note"}, {"pass"})):
@@ -57,6 +62,8 @@ class _Reader:
             self.acts += [Act("note", what=thing) for thing in things]
         elif self._is_posture(parts, verbs):
             self._posture(things, wheres)
+        elif verbs == {"face"} and not things and any(meaning in RELATIONS for meaning, _ in wheres):
+            self._state(things, ways, wheres, verbs)  # "look on the left, just past the machine room"
         elif "face" in verbs or (verbs & {"turn"} and not ways and wheres and wheres[0][0] in ("to", "away")):
             self._face(things, ways, wheres)
         elif "take" in verbs and set(ways) <= {"ahead"} and any("unit" in thing.heads for thing in things):
@@ -73,6 +80,10 @@ class _Reader:
         elif "halt" in verbs:
             self._go(things, ways, [("to" if one.heads & {"unit"} or meaning == "at" else meaning, one)
                                     for meaning, one in wheres], until=True)
+        elif verbs == {"be"} and not things and [by for by, one in wheres[:1] if one.heads & POINTS] == ["to"]:
+            self._go([], ways, wheres)  # "and to the very end, where the lamp is"
+        elif verbs >= {"reach", "pass"}:
+            self._go(things, ways, wheres, passing=True)  # "walk until you have passed the lamp"
         elif "reach" in verbs and "be" not in verbs:
             self._go(things, ways, wheres, until=True)
         elif verbs & {"go", "pass"} and not (verbs & {"be"} and any(thing.is_door for thing in things)):
@@ -91,9 +102,8 @@ class _Reader:
         begun = len(self.acts) if begun and self.acts[-1] is before else begun
         self.notes_on = clause.end == "and" and bool(self.acts) and (self.notes_on or self.acts[-1].sort == "note")
         self.wants_orient = clause.end == "so"
-        if parts:
-            text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
-            self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
+        text = " ".join(word.text for part in parts for word in part.words) or " ".join(verbs)
+        self.acts[begun:] = [replace(act, text=text) for act in self.acts[begun:]]
 
     def _collect(self, parts: Sequence[Part], verbs: set[str]) -> tuple[list[ThingWords], list[str], Wheres]:
         """Things, ways, and prepositions with their things; sides belong to the thing before them."""
@@ -113,6 +123,9 @@ class _Reader:
                         -1].is_door:
                     things[-1] = replace(things[-1], relations=(
                         *things[-1].relations, *self._relation(part.meaning, part.words)))
+                elif not verbs and not things and part.meaning in ("on", "in") and all(
+                        word.meaning == "it" for word in part.words) and part.words:
+                    continue  # "his name's on it"
                 elif part.words or part.meaning not in ("at", "on", "along" if self._it().is_door else "at"):
                     wheres.append((part.meaning, self._describe(part.meaning, part.words)))
                     target, located = None, True
@@ -129,20 +142,15 @@ class _Reader:
                 ways.append(side)
             located = False
         return [self._resolve(thing, verbs) for thing in things], ways, [
-            (self._by(meaning, one), self._resolve(one, {meaning})) for meaning, one in wheres]
+            (meaning if meaning != "by" else "along" if one.is_stretch else "past", self._resolve(one, {meaning}))
+            for meaning, one in wheres]
 
     def _read_side(self, part: Part) -> str:
         """``The same side``, ``the other side``: left or right where that was said before."""
         meanings = {word.meaning for word in part.words}
-        if meanings == {"side"} and part.meaning == "on" and self.acts and self.acts[-1].sort == "turn":
-            return self.acts[-1].way  # "turn left, there is a door on that side"
         if not ("side" in meanings and meanings <= {"side", *SAME}) or len(meanings) != 2:
             return ""
         return "same" if "same" in meanings else "other"
-
-    def _by(self, meaning: str, thing: ThingWords) -> str:
-        """By a hall is along it, by a thing past it."""
-        return meaning if meaning != "by" else "along" if thing.is_stretch else "past"
 
     def _it(self) -> ThingWords:
         return self.last_thing or ThingWords()
@@ -159,7 +167,7 @@ class _Reader:
             thing = replace(hall if by & {"along", "go", "take"} else self._it(), side=thing.side, count=thing.count)
         if thing.names or thing.heads - {"side", "unit", "end"}:
             self.last_thing = thing
-            self.last_stretch = thing if thing.is_stretch else self.last_stretch
+            self.last_stretch = thing if thing.is_stretch and not by & {"past", "across"} else self.last_stretch
         return thing
 
     def _relation(self, meaning: str, words: Sequence[Word]) -> Iterable[tuple[str, ThingWords]]:
@@ -217,7 +225,9 @@ class _Reader:
 
     def _turn(self, things: list[ThingWords], ways: list[str], wheres: Wheres) -> None:
         halls = [thing for thing in things if thing.is_stretch]
-        onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch]
+        counted = next((thing.place for thing in things if "unit" in thing.heads), math.inf)
+        onto = [one for meaning, one in wheres if meaning in ("to", "along", "on", "in") and one.is_stretch
+                and not (meaning == "to" and one.place > counted)]  # "right one block to the blue hall" walks there
         at = [one for meaning, one in wheres if (meaning == "at" or (meaning == "on" and not one.is_stretch))
               and (one.heads or one.names)]
         begin = [meaning for meaning, one in wheres if meaning in ("past", "before") or one in onto][:1]
@@ -294,11 +304,6 @@ class _Reader:
         halls = [one for one in (*things, *(one for _, one in wheres)) if one.is_stretch]
         if halls and not (what and what[0].is_door):
             self._turn(halls, ways, [(meaning, one) for meaning, one in wheres if one is not halls[0]])
-        elif not what and [meaning for meaning, _ in wheres] == ["past"] and self._it().is_door:
-            # "skip a door and take the one after"
-            last = self.acts[-1].past[-1:] if self.acts else ()
-            self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), count="1", side=last[0].side) if last
-                                 else ThingWords(frozenset(("door",)), relations=tuple(wheres)), enters=True))
         elif not what:
             self._terse(things, ways, wheres)
         else:
@@ -324,15 +329,14 @@ class _Reader:
         if blocks and len(things) > 1:  # "an easel one block in front of you"
             side = side or blocks[0].side
             things = [thing for thing in things if "unit" not in thing.heads]
-            self.ahead = blocks[0].number if side in ("ahead", "") and not verbs & {"there", "see"} else 0
         doors = [thing for thing in things if thing.is_door or (
             thing.count and thing.side and not thing.heads and not thing.names)]
-        if doors or not things:
-            doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
+        doors += [one for meaning, one in wheres if meaning in ("in", "at") and one.is_door]
         if doors:
-            goal = _at_end(_merge(doors), wheres)
+            goal = _merge(doors)
             goal = replace(goal, side=goal.side or (side if side in SIDES else ""),
                            relations=(*goal.relations, *related))
+            goal = _at_end(goal, wheres)
             self.acts.append(Act("find", what=goal))
         elif not things and (related or side):
             self.acts.append(Act("find", what=ThingWords(frozenset(("door",)), side=side, relations=related)))
@@ -359,7 +363,10 @@ class _Reader:
         related = tuple((meaning, one) for meaning, one in wheres if meaning in RELATIONS and one.text)
         side = next((one.side for _, one in wheres if one.side), "")
         last = self.acts[-1] if self.acts else None
-        if not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
+        if last is None and things and wheres and not ways and all(
+                meaning in ("at", "in") and one.heads & POINTS for meaning, one in wheres):  # "the lamp at the corner"
+            self.acts.append(Act("find", what=_merge([wheres[0][1], *(one for one in things if not one.heads)])))
+        elif not things and last is not None and last.sort in ("find", "see") and (related or side) and not ways:
             self._amend(related, side)
         elif things and things[0].heads == {"side"}:
             self.side = things[0].count if things[0].count in SAME else ""  # "same side as this room, the next door"
@@ -383,7 +390,8 @@ class _Reader:
             goal = _merge(things)
             side, self.side = goal.side or next(iter(ways), self.side), ""
             is_beyond = any(meaning == "past" for meaning, _ in related)
-            is_named = last is not None and last.sort == "find" and bool(last.what and last.what.names)
+            is_named = last is not None and last.sort == "find" and bool(last.what and last.what.names) and not any(
+                last.what.names == one.names for _, one in related if last.what)  # "the room across from it"
             if is_named and not goal.names and not is_beyond:
                 self._amend(related, side)  # "the library is opposite, one door to the left"
             else:
@@ -455,9 +463,9 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
     reader = _Reader()
     for clause in ordered:
         reader.read(clause)
-    if reader.ahead and reader.acts[-1].sort == "see" and not reader.goals:  # "the lamp is one block ahead", no more
-        what = reader.acts.pop().what
-        reader.acts.append(Act("go", until=what and replace(what, side=""), units=reader.ahead))
+    if reader.acts and reader.acts[-1].sort == "find" == (reader.goals or reader.acts)[-1].sort and reader.goals:
+        what, goal = reader.acts.pop().what, reader.goals.pop()  # "find Allen's office; it is the next door"
+        reader.goals.append(replace(goal, what=what and goal.what and _merge((goal.what, what))))
     reader.acts += reader.goals
     if not any(act.sort in ("exit", "turn", "go") for act in reader.acts):  # "find the lamp, it is in the corner"
         reader.acts = [replace(act, sort="see") if act.sort == "orient" and act.what and act.what.side == "ahead"
@@ -467,7 +475,8 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
             reader.acts[:1] = [replace(act, sort="find") for act in reader.acts[:1] if act.what and act.what.names]
     for index, act in enumerate(reader.acts[:-1]):
         after = reader.acts[index + 1]
-        if act.sort == "find" == after.sort and after.what and any(by == "past" for by, _ in after.what.relations):
+        if act.sort == "find" == after.sort and act.what and after.what and any(
+                by == "past" or one.names == act.what.names for by, one in after.what.relations):
             reader.acts[index] = replace(act, sort="see")  # "the library is on the left; it is the door after that"
     done = max((index for index, act in enumerate(reader.acts) if act.sort in ("go", "turn", "exit")), default=-1)
     ordered_acts = [replace(act, sort="see") if act.sort == "find" and index < done and not act.enters and reader.acts[
@@ -481,8 +490,15 @@ def read_acts(clauses: Sequence[Clause]) -> list[Act]:
 def _correct(clauses: Sequence[Clause]) -> list[Clause]:
     """``Turn right - no, left``: what is said after a correction stands for the clause before, or a part of it."""
     kept: list[Clause] = []
-    is_fix = False
+    is_fix = is_aside = False
     for clause in clauses:
+        verbs = {part.meaning for part in clause.parts if part.sort == "verb"}
+        counts = any(word.sort == "COUNT" for part in clause.parts for word in part.words)
+        is_denial = [part.meaning for part in clause.parts[:1]] == ["not"] and clause.end != "but" and not verbs
+        if (kept and is_denial) or (is_aside and verbs == {"be"} and not counts):
+            is_aside = clause.end == "comma"
+            continue  # "the second door, not the first, that is Allen's"
+        is_aside = is_aside and not clause.parts
         wrong = next((place for place in range(len(kept) - 1, -1, -1) if kept[place].parts), None)
         if is_fix and clause.parts and wrong is not None:
             old, new = kept[wrong].parts, clause.parts

@@ -13,6 +13,8 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
+from harvey.errors import BadInput
+
 CLASSES = ("VERB", "WAY", "PREP", "SEP", "NOT", "COUNT", "HEAD", "THING", "MOD")
 LONGEST = 5
 """Words of the longest phrase."""
@@ -20,11 +22,11 @@ MOST_WORDS = 300
 """What comes after so many words of a text is not read: a way told by a person has some tens."""
 SHORT, LONG = 4, 8
 """Letters of a word that may have one wrong, and two."""
-ARTICLES = frozenset(("the", "a", "an", "your", "this", "that", "of", "past", "to"))
-POINTING = frozenset(("the", "this", "that", "which", "each", "no"))
-TAKING = frozenset(("follow", "take", "taking", "following", "reach", "pass", "walk", "go", "ignore", "skip"))
-"""Words before ``one``, and before ``it`` or ``that``, that make them stand for something that was named."""
-Phrase = tuple[str, ...]
+OWN_FILE = Path(__file__).with_name("lexicon.toml")
+
+
+class LexiconError(BadInput):
+    """A file of a language that cannot be used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +38,14 @@ class Word:
         meaning: the lexicon's or the model's word for it.
         text: as it stands in the text.
         place: number of its first word in the text.
+        roles: what it does for the words beside it.
     """
 
     sort: str
     meaning: str
     text: str
     place: int
+    roles: frozenset[str] = frozenset()
 
 
 class Lexicon:
@@ -51,7 +55,7 @@ class Lexicon:
         """``named``: of each thing of the building, the words by which it is named there."""
         called = {frozenset(words) for words in named}
         names = frozenset[str]().union(*called)
-        self.phrases: dict[Phrase, tuple[str, str]] = {
+        self.phrases: dict[tuple[str, ...], tuple[str, str]] = {
             tuple(phrase.split()): (sort, meaning)
             for sort in CLASSES for meaning, phrases in data[sort].items() for phrase in phrases}
         self.phrases |= {(colour,): ("MOD", colour) for colour in data["COLOURS"]}
@@ -63,7 +67,8 @@ class Lexicon:
         self._tell_apart(data, called, names)
         self.names = frozenset(name for name in names if not name.isdigit() and (name,) not in self.phrases)
         self.names -= {word for (word, *more) in self.skipped if not more}
-        self._naming = frozenset(data["NAMING"]["words"])
+        self._roles = data["ROLES"]
+        self._rewrites = data["SPLIT"]["rows"]
         self._nearest: dict[str, str] = {}
 
     def _tell_apart(self, data: Mapping[str, Any], called: Iterable[frozenset[str]], names: frozenset[str]) -> None:
@@ -91,7 +96,7 @@ class Lexicon:
 
     def read(self, text: str) -> list[Word]:
         """The words of a text that mean something, in order; chatter is left out."""
-        pieces = split_text(text)
+        pieces = split_text(text, self._rewrites)
         corrected = [piece if piece in self._words else self.nearest(piece) for piece in pieces]
         found: list[Word] = []
         place = 0
@@ -100,25 +105,27 @@ class Lexicon:
             own = pieces[place:place + length]
             if self._says_nothing(corrected, place, sort, meaning):
                 sort = ""
-            if sort == "STRANGE" and (place == 0 or pieces[place - 1] not in ARTICLES):
+            if sort == "STRANGE" and (place == 0 or pieces[place - 1] not in self._roles["article"]):
                 sort = ""
             if sort:
-                found.append(Word(sort, meaning, " ".join(own), place))
+                said = " ".join(own)
+                roles = frozenset(role for role, words in self._roles.items() if said in words)
+                found.append(Word(sort, meaning, said, place, roles))
             place += length
         return found
 
     def _says_nothing(self, pieces: Sequence[str], place: int, sort: str, meaning: str) -> bool:
         """Whether a word only stands for another, or is of a name: ``the blue one``, ``position 2``, ``this hall``."""
-        before = pieces[place - 1] if place else ""
-        if sort == "COUNT" and pieces[place] in ("one", "1"):
-            return before in self._naming or before in POINTING or self._sort(before) in ("COUNT", "MOD")
+        before, roles = pieces[place - 1] if place else "", self._roles
         if sort == "COUNT":
-            return before in self._naming
+            return before in roles["naming"] or (pieces[place] in roles["one"] and (
+                before in roles["pointing"] or self._sort(before) in ("COUNT", "MOD")))
         if meaning != "it":
             return False
-        after = self._longest(pieces, place + 1)[1] if place + 1 < len(pieces) and pieces[place] != "it" else ""
+        is_apart = place + 1 == len(pieces) or pieces[place] in roles["pronoun"]
+        after = "" if is_apart else self._longest(pieces, place + 1)[1]
         return after in ("HEAD", "THING", "MOD", "COUNT") or not (
-            self._sort(before) == "PREP" or before in TAKING)
+            self._sort(before) == "PREP" or before in roles["taking"])
 
     def _sort(self, piece: str) -> str:
         """The class of a single word; '' of chatter."""
@@ -144,7 +151,8 @@ class Lexicon:
 
     def meanings(self, text: str) -> frozenset[str]:
         """What the words of a name or a description in the model mean, phrases before single words."""
-        pieces = [piece for piece in split_text(text) if piece not in (".", ",") and not piece.isdigit()]
+        split = split_text(text, self._rewrites)
+        pieces = [piece for piece in split if piece not in (".", ",") and not piece.isdigit()]
         found: set[str] = set()
         place = 0
         while place < len(pieces):
@@ -176,15 +184,12 @@ class Lexicon:
         return min(near)[-1]
 
 
-def split_text(text: str) -> list[str]:
+def split_text(text: str, rewrites: Iterable[tuple[str, str]] = ()) -> list[str]:
     """The words of a text in small letters, full stops and commas; at most ``MOST_WORDS``."""
     plain = text[:40 * MOST_WORDS].lower().replace("’", "'")
-    plain = re.sub(r"'s\b", " s", plain)
-    plain = re.sub(r"\b(i)'?m\b", r"\1 am", plain)
-    plain = re.sub(r" -+ |--+|[–—]", " , ", plain)
-    plain = re.sub(r"\b(can|don|won|isn|doesn)t\b", r"\1 t", plain)
-    plain = re.sub(r"\b(you|they|we)(re|ll)\b|\b(that|there|here)(s)\b", r"\1\3 \2\4", plain)
-    pieces = re.findall(r"[a-z]+|\d+(?:st|nd|rd|th)?|[.,;:!?\n]", plain)[:MOST_WORDS]
+    for pattern, instead in ((" -+ |--+|[–—]", " , "), *rewrites):
+        plain = re.sub(pattern, instead, plain)
+    pieces = re.findall(r"[^\W\d_]+|\d+(?:st|nd|rd|th)?|[.,;:!?\n]", plain)[:MOST_WORDS]
     return [{";": ".", ":": ",", "!": ".", "?": ".", "\n": "."}.get(piece, piece) for piece in pieces]
 
 
@@ -206,6 +211,11 @@ def edit_distance(one: str, other: str, most: int) -> int:
 
 
 @cache
-def lexicon_data() -> Mapping[str, Any]:
-    """The file of the language."""
-    return tomllib.loads(Path(__file__).with_name("lexicon.toml").read_text(encoding="utf-8"))
+def lexicon_data(path: str | Path = OWN_FILE) -> Mapping[str, Any]:
+    """The file of a language. Raises LexiconError, naming the file."""
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        Lexicon(data)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise LexiconError(f"{path}: expected a lexicon in the form of {OWN_FILE.name}, got {error!r}") from error
+    return data

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from harvey_words.reading.lexicon import Word
 
@@ -25,7 +25,7 @@ class ThingWords:
         count: ``1`` to ``9``, ``last``, ``only``, ``other``, ``same``, or nothing.
         side: where it is said to be.
         relations: by what it is told apart, as (``past``, another description).
-        text: its words as they stand.
+        text: its words as they stand; place: number of the first of them in the text.
     """
 
     heads: frozenset[str] = frozenset()
@@ -34,6 +34,7 @@ class ThingWords:
     side: str = ""
     relations: tuple[tuple[str, ThingWords], ...] = ()
     text: str = ""
+    place: int = field(default=0, compare=False)
 
     @property
     def is_door(self) -> bool:
@@ -56,9 +57,11 @@ class ThingWords:
 def describe(words: Sequence[Word], side: str = "") -> ThingWords:
     """What a row of words describes."""
     heads = frozenset(word.meaning for word in words if word.sort == "HEAD")
+    heads |= {"end"} if "dead-end" in heads else set()
     counts = [word.meaning for word in words if word.sort == "COUNT"]
     names = tuple(word for word in words if word.sort not in ("HEAD", "COUNT") and word.meaning != "&")
-    return ThingWords(heads, names, counts[0] if counts else "", side, (), " ".join(word.text for word in words))
+    return ThingWords(heads, names, counts[0] if counts else "", side, (), " ".join(word.text for word in words),
+                      words[0].place if words else 0)
 
 
 @dataclass(frozen=True)

@@ -42,8 +42,6 @@ STARTS = frozenset(
     ("go", "turn", "take", "face", "reach", "enter", "through", "exit", "pass", "halt", "stand", "there"))
 """Verbs with which another clause begins, also where nothing stands between."""
 NOUNS = frozenset(("HEAD", "THING", "MOD", "NAME", "STRANGE", "COUNT"))
-STATING = frozenset(("has", "have"))
-"""Words that say of a place what is there, and do not tell it from others by that."""
 MOST_BETWEEN = 6
 """Words between the two that are joined by ``and``."""
 
@@ -131,14 +129,14 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
             continue
         if word.meaning == "open" and before and before.sort == "NOT":
             word = Word("MOD", "closed", word.text, word.place)
-        if word.text.startswith("the one") and before and before.sort not in ("SEP", "VERB"):
+        if "one-after" in word.roles and before and before.sort not in ("SEP", "VERB"):
             yield from (Word("SEP", "comma", "", word.place), Word("VERB", "enter", "", word.place))
-        if word.text == "its" and before and before.sort == "PREP":
+        if "whose" in word.roles and before and before.sort == "PREP":
             continue
-        if word.text == "after that" and before and before.sort in NOUNS and (after is None or after.meaning == "dot"):
+        if "after-that" in word.roles and before and before.sort in NOUNS and (after is None or after.meaning == "dot"):
             yield from (Word("PREP", "past", "after", word.place), Word("HEAD", "it", "that", word.place))
             continue
-        if word.text == "once" and (after is None or after.sort == "SEP" or (
+        if "once" in word.roles and (after is None or after.sort == "SEP" or (
                 before and before.meaning in ("go", "ahead"))):
             yield Word("COUNT", "1", word.text, word.place)
         elif word.meaning in COMPASS and after is not None and after.sort == "HEAD":
@@ -156,14 +154,14 @@ def _mend(words: Sequence[Word]) -> Iterator[Word]:
                 pair = index + MOST_BETWEEN if before and before.meaning in ("crossing", "corner") else pair
                 yield word
         elif before and before.sort in NOUNS and (
-                word.text.startswith("all the way") or (before.meaning == "unit" and word.sort in NOUNS)):
+                "far" in word.roles or (before.meaning == "unit" and word.sort in NOUNS)):
             yield from (Word("SEP", "comma", "", word.place), word)  # "two blocks chair", "the hall all the way down"
-        elif word.text in STATING and is_joint:
+        elif "has" in word.roles and is_joint:
             yield from (Word("SEP", "comma", "", word.place), Word("VERB", "there", word.text, word.place))
         elif word.meaning == "with" and is_joint and before and before.sort in ("HEAD", "MOD"):
             pair = index + MOST_BETWEEN if before and before.meaning in ("crossing", "corner") else pair
             yield Word("PREP", "of", word.text, word.place)
-        elif word.text == "where" and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
+        elif "where" in word.roles and word.sort == "VERB" and (after is None or after.sort in ("VERB", "SEP") or (
                 before and (before.sort == "PREP" or before.meaning == "reach"))):
             continue
         else:
@@ -179,8 +177,8 @@ def _join_meetings(words: Sequence[Word]) -> list[Word]:
         if word.sort != "VERB" or word.meaning != "meet":
             continue
         begin = next((back for back in range(index - 1, max(index - 10, -1), -1)
-                      if words[back].text == "where" or words[back].meaning == "dot"), 0)
-        if words[begin].text != "where":
+                      if "where" in words[back].roles or words[back].meaning == "dot"), 0)
+        if "where" not in words[begin].roles:
             continue
         for place in range(begin + 1, index + 1):
             if joined[place].meaning in ("and", "meet"):
