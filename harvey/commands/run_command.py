@@ -79,7 +79,7 @@ def _run_run(args: Namespace) -> int:
         Task(args.scenario, pairs, seed, _out(args, seed, many), body, args.go_on, args.sync, args.recording)
         for seed, pairs in zip(seeds, drawn, strict=True))
     if args.check:
-        if also := [name for name in ("live", "trace", "go_on") if getattr(args, name)]:
+        if also := [name for name in ("live", "trace", "go_on", "tell") if getattr(args, name)]:
             raise BadInput(f"--check: expected it without --{also[0].replace('_', '-')}, because nothing is driven")
         return _check(tasks[0])
     if len(tasks) == 1:
