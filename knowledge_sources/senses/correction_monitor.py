@@ -34,8 +34,6 @@ MIN_REACH_M = 0.2
 """A shorter way does not tell how far the wheels go."""
 ELSEWHERE = 1.0, 1.0, 1.0
 """How far off a robot is that was pushed or carried, or takes one place for another [m, m, rad]."""
-
-
 P_MOVED, P_STOOD = 0.001, 0.3
 """Part of the pairs of pictures, while the wheels stand, in which all moves by chance, as by a push just then; and in
 which nothing moves though they are late: it had stood for long enough."""
