@@ -21,11 +21,11 @@ from knowledge_sources.methods.floor import (
     revise_by_thing,
 )
 from knowledge_sources.priority import Priority
-from knowledge_sources.reads import find_building, find_frames, list_filed_doors, name_model
+from knowledge_sources.reads import find_building, find_frames, list_contradicted, list_filed_doors, name_model
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.model_errors import BETWEEN, find_facing, measure_between
-from world_models.entries import CameraState, Difference, DoorState, Obstacle, UserReport
+from world_models.entries import BELIEVED, OTHERWISE, CameraState, Difference, DoorState, Obstacle, UserReport
 from world_models.entries.difference import DOORS, MODEL
 
 
@@ -57,12 +57,11 @@ class Case(NamedTuple):
 class ModelReviser(RobotKnowledgeSource):
     """Alone revises what is known of locales: by things, doors, what surely differs, and what somebody says.
 
-    Of two that say otherwise the newer counts. All that is new of a locale comes into its frame at once, so that who
-    reads why it was revised finds all of it. A door is in the frames of both its rooms, a wall in those of all at it.
-    Walls are redrawn once it is sure that they are elsewhere, and not the camera is otherwise; where no wall explains
-    that the model is inexact, the whole building is, until looks acquit it. What changes no plan revises no frame.
-    What cannot be taken up, because the model has nothing of that name, is answered. It acts at once, before the next
-    increment: the door may be just ahead.
+    Of two that say otherwise the newer counts, and a report that is found to be wrong says so. All that is new of a
+    locale comes into its frame at once. A door is in the frames of both its rooms, a wall in those of all at it. Walls
+    are redrawn once it is sure that they, and not the camera, differ; where no wall explains that the model is inexact,
+    the whole building is, until looks acquit it. What changes no plan revises no frame. What the model has nothing of
+    is answered. It acts at once, before the next increment: the door may be just ahead.
     """
 
     level, priority = Level.ACTION, Priority.ENTER
@@ -94,6 +93,7 @@ class ModelReviser(RobotKnowledgeSource):
                 taken.update(entry.id for entry in reasons)
         from_user = [said.entry for said in statements if said.is_from_user]
         answers = tuple((entry, _answer(entry.id in taken, errors.get(entry.id))) for entry in from_user)
+        answers += tuple((entry, OTHERWISE) for entry in list_contradicted(view, [value for _, value, _ in frames]))
         return Case(tuple(frames), answers) if frames or answers else None
 
     def act(self, view: View, case: Case) -> Iterable[Effect]:
@@ -147,4 +147,4 @@ class ModelReviser(RobotKnowledgeSource):
 def _answer(is_taken: bool, error: str | None) -> str:
     if error is not None:
         return f"which cannot be: {error}"
-    return "and believes it from now on" if is_taken else "which it knew already"
+    return BELIEVED if is_taken else "which it knew already"

@@ -1,8 +1,8 @@
-"""The doors that a picture may show; for several knowledge sources."""
+"""The doors that a picture may show, and what somebody says of doors and things; for several knowledge sources."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,11 +10,11 @@ import shapely
 
 from blackboard import Entry, View
 from knowledge_sources.methods.doors import MAX_TOUCH_M, is_in_view
-from knowledge_sources.methods.floor import build_polygon, may_be_there
+from knowledge_sources.methods.floor import build_polygon, contradicts, may_be_there
 from knowledge_sources.reads.questions import find_frames, find_robot_in
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
-from world_models.entries import DoorState, Hypothesis, Obstacle
+from world_models.entries import BELIEVED, DoorState, Hypothesis, Obstacle, UserReport
 from world_models.frame_building import FrameBuilding
 
 MAX_SIGMA_M = 0.1  # largest standard deviation of the robot's place when it judges a door
@@ -67,3 +67,10 @@ def with_door_open(view: View, door: str, frames: Frames) -> FrameBuilding:
 def with_door_shut(view: View, door: str, frames: Frames) -> FrameBuilding:
     """The building as it would be known if a door were shut that is believed to be open."""
     return FrameBuilding(view, [entry.value.changed(FrameChange("shut", door, "")) for entry in frames])
+
+
+def list_contradicted(view: View, frames: Sequence[LocaleFrame]) -> tuple[Entry[UserReport], ...]:
+    """What somebody said last of a door or a thing, and was believed, where frames say otherwise."""
+    newest = {entry.value.what: entry for entry in view.all(UserReport)}
+    return tuple(entry for entry in newest.values() if entry.value.answer == BELIEVED
+                 and any(contradicts(frame, entry.value, entry.author) for frame in frames))

@@ -14,7 +14,8 @@ from knowledge_sources.methods.floor.footprints import (
 from knowledge_sources.methods.floor.ranges import see_ranges
 from knowledge_sources.methods.floor.relief import TYPICAL_M
 from knowledge_sources.methods.floor.revise_frame import (
-    is_width, place_walls, redraw, redraw_door, revise_by_difference, revise_by_door, revise_by_report, revise_by_thing,
+    contradicts, is_width, place_walls, redraw, redraw_door, revise_by_difference, revise_by_door, revise_by_report,
+    revise_by_thing,
 )
 from knowledge_sources.methods.floor.see_floor import (
     FLOOR_VIEW_DISTANCE_M, FLOOR_VIEW_TURN_RAD, MotionBetween, Seen, see_free_floor,
@@ -36,9 +37,9 @@ __all__ = [
     "CELL_M", "FLOOR_VIEW_DISTANCE_M", "FLOOR_VIEW_TURN_RAD", "LOOK_PICTURE_S", "MAX_FIXED_LOOKS", "MIN_MOVED_M",
     "MIN_OBSTACLE_CERTAINTY", "MIN_SIDE_M", "MIN_THING_CERTAINTY", "P_CAMOUFLAGED", "TOUCH_MARGIN_M", "TYPICAL_M",
     "FloorMap", "Lookout", "MotionBetween", "Seen", "Sight", "Sweep", "build_free_floor", "build_polygon",
-    "choose_look", "enclose", "explain_seen_elsewhere", "explain_seen_in_patch", "explain_touch", "find_blind",
-    "find_fixed", "find_floor", "find_touched", "is_behind", "is_telling", "is_width", "judge_by", "judge_thing",
-    "list_corners", "locate_touch", "may_be_there", "measure_approach_m", "measure_first_seen_m", "move_thing",
-    "place_walls", "redraw", "redraw_door", "revise_by_difference", "revise_by_door", "revise_by_report",
+    "choose_look", "contradicts", "enclose", "explain_seen_elsewhere", "explain_seen_in_patch", "explain_touch",
+    "find_blind", "find_fixed", "find_floor", "find_touched", "is_behind", "is_telling", "is_width", "judge_by",
+    "judge_thing", "list_corners", "locate_touch", "may_be_there", "measure_approach_m", "measure_first_seen_m",
+    "move_thing", "place_walls", "redraw", "redraw_door", "revise_by_difference", "revise_by_door", "revise_by_report",
     "revise_by_thing", "sample_sweep", "see_free_floor", "see_ranges", "touch_again", "touch_first",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -140,3 +141,10 @@ def revise_by_report(frame: LocaleFrame, report: UserReport, by: str) -> LocaleF
     if (state, what) in known:
         return frame
     return frame.changed(FrameChange("shut" if state == "shut" else "gone", what, by))
+
+
+def contradicts(frame: LocaleFrame, report: UserReport, by: str) -> bool:
+    """Whether a frame says otherwise of a door or a thing than somebody does."""
+    with suppress(ValueError):  # it has nothing of that name
+        return revise_by_report(frame, report, by).changes != frame.changes
+    return False
