@@ -25,7 +25,7 @@ from knowledge_sources.reads import find_building, find_frames, list_contradicte
 from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.building.locale_frame import LocaleFrame
 from world_models.building.model_errors import BETWEEN, find_facing, measure_between
-from world_models.entries import BELIEVED, OTHERWISE, CameraState, Difference, DoorState, Obstacle, UserReport
+from world_models.entries import BELIEVED, KNOWN, OTHERWISE, CameraState, Difference, DoorState, Obstacle, UserReport
 from world_models.entries.difference import DOORS, MODEL
 
 
@@ -147,4 +147,4 @@ class ModelReviser(RobotKnowledgeSource):
 def _answer(is_taken: bool, error: str | None) -> str:
     if error is not None:
         return f"which cannot be: {error}"
-    return BELIEVED if is_taken else "which it knew already"
+    return BELIEVED if is_taken else KNOWN

@@ -14,7 +14,7 @@ from knowledge_sources.methods.floor import build_polygon, contradicts, may_be_t
 from knowledge_sources.reads.questions import find_frames, find_robot_in
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.building.locales import Doorway
-from world_models.entries import BELIEVED, DoorState, Hypothesis, Obstacle, UserReport
+from world_models.entries import BELIEVED, KNOWN, DoorState, Hypothesis, Obstacle, UserReport
 from world_models.frame_building import FrameBuilding
 
 MAX_SIGMA_M = 0.1  # largest standard deviation of the robot's place when it judges a door
@@ -70,7 +70,7 @@ def with_door_shut(view: View, door: str, frames: Frames) -> FrameBuilding:
 
 
 def list_contradicted(view: View, frames: Sequence[LocaleFrame]) -> tuple[Entry[UserReport], ...]:
-    """What somebody said last of a door or a thing, and was believed, where frames say otherwise."""
+    """What somebody said last of a door or a thing, and was taken up, where frames say otherwise."""
     newest = {entry.value.what: entry for entry in view.all(UserReport)}
-    return tuple(entry for entry in newest.values() if entry.value.answer == BELIEVED
+    return tuple(entry for entry in newest.values() if entry.value.answer in (BELIEVED, KNOWN)
                  and any(contradicts(frame, entry.value, entry.author) for frame in frames))

@@ -31,21 +31,22 @@ from world_models.entries.obstacle import (
 from world_models.entries.percepts import Anchor, Glimpse, LineMatch, Panorama, PoseFix, Segments, Track, Tracks
 from world_models.entries.robot_state import CameraLesson, CameraState, Drift, Footprint, Wheels, find_camera_lessons
 from world_models.entries.task import (
-    BELIEVED, Certificate, Command, DOOR_STATES, GO_ON, Goal, Impasse, Leg, Milestone, MilestoneVerdict, OTHERWISE,
-    Outcome, PlanSketch, Redirection, Resumed, SketchStatus, Subgoal, UserReport,
+    BELIEVED, Certificate, Command, DOOR_STATES, GO_ON, Goal, Impasse, KNOWN, Leg, Milestone, MilestoneVerdict,
+    OTHERWISE, Outcome, PlanSketch, Redirection, Resumed, SketchStatus, Subgoal, UserReport,
 )
 from world_models.obstruction import Obstruction
 
 __all__ = [
-    "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "BELIEVED", "DOOR_STATES", "GO_ON", "LADDER", "LAST_REPORTS", "LAST_VIEWS",
-    "MISLEADING", "OPEN", "OTHERWISE", "RISK", "SENSES", "SHARED_SIGMA_M", "STOP_KEY", "Alias", "AliasOdds", "Anchor",
-    "BodyFault", "CameraLesson", "CameraPicture", "CameraState", "Certificate", "Command", "Contact", "Corners",
-    "Course", "Difference", "Discrepancy", "DoorCondition", "DoorPicture", "DoorState", "Drift", "Evidence",
-    "Explanation", "FloorEnd", "FloorThing", "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal", "Hypothesis",
-    "Impasse", "Leg", "Light", "LineMatch", "LocalePoses", "Milestone", "MilestoneVerdict", "MotionReport",
-    "MotorCommand", "Obstacle", "ObstacleStatus", "Obstruction", "Odometry", "Outcome", "Panorama", "PictureRequest",
-    "Place", "PlaceOdds", "PlaceSearch", "PlanSketch", "Point", "PoseFix", "Protection", "Ranges", "Recovery",
-    "Redirection", "Resumed", "Ride", "RideReport", "Rival", "RivalKind", "Segments", "Sense", "SketchStatus",
-    "Subgoal", "Track", "Tracks", "Travel", "UserReport", "Wheels", "begin_travel", "correct", "count_sigmas",
-    "covariance_tuple", "diagonal", "find_camera_lessons", "last_escalated", "open_or_measure", "turn_about_camera",
+    "ALERT_LIMIT_M", "AROUND_SIGMA_RAD", "BELIEVED", "DOOR_STATES", "GO_ON", "KNOWN", "LADDER", "LAST_REPORTS",
+    "LAST_VIEWS", "MISLEADING", "OPEN", "OTHERWISE", "RISK", "SENSES", "SHARED_SIGMA_M", "STOP_KEY", "Alias",
+    "AliasOdds", "Anchor", "BodyFault", "CameraLesson", "CameraPicture", "CameraState", "Certificate", "Command",
+    "Contact", "Corners", "Course", "Difference", "Discrepancy", "DoorCondition", "DoorPicture", "DoorState", "Drift",
+    "Evidence", "Explanation", "FloorEnd", "FloorThing", "FloorView", "Footprint", "FreeFloor", "Glimpse", "Goal",
+    "Hypothesis", "Impasse", "Leg", "Light", "LineMatch", "LocalePoses", "Milestone", "MilestoneVerdict",
+    "MotionReport", "MotorCommand", "Obstacle", "ObstacleStatus", "Obstruction", "Odometry", "Outcome", "Panorama",
+    "PictureRequest", "Place", "PlaceOdds", "PlaceSearch", "PlanSketch", "Point", "PoseFix", "Protection", "Ranges",
+    "Recovery", "Redirection", "Resumed", "Ride", "RideReport", "Rival", "RivalKind", "Segments", "Sense",
+    "SketchStatus", "Subgoal", "Track", "Tracks", "Travel", "UserReport", "Wheels", "begin_travel", "correct",
+    "count_sigmas", "covariance_tuple", "diagonal", "find_camera_lessons", "last_escalated", "open_or_measure",
+    "turn_about_camera",
 ]

@@ -408,8 +408,9 @@ class Resumed:
 
 ReportedState = Literal["shut", "open", "gone", "there"]
 DOOR_STATES: tuple[ReportedState, ...] = ("shut", "open")
-BELIEVED, OTHERWISE = "and believes it from now on", "but has found otherwise since"
-"""What became of a report that was news."""
+BELIEVED, KNOWN = "and believes it from now on", "which it knew already"
+OTHERWISE = "but has found otherwise since"
+"""What became of a report."""
 
 
 @observation()
