@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from blackboard import Change, Effect, Entry, Level, Post, Revise, View, Watch
+from blackboard import Change, Effect, Entry, Level, Post, Revise, View, Watch, rule
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import deepest_sketch, is_over
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
 from world_models.entries import Discrepancy, Impasse, PlanSketch, last_escalated
 
 MAX_CHECKS_PER_SUBGOAL = 20
@@ -21,31 +20,27 @@ GIVEN_UP: Mapping[Level, tuple[str, str]] = {
 """How the mission ends when a level was asked too often, and its reason."""
 
 
-class DiscrepancyRaiser(RobotKnowledgeSource):
+@rule(on=Watch(Discrepancy, where=lambda d: d.exceeds), writes=(Discrepancy, Impasse), level=Level.PLAN,
+      priority=Priority.ENTER)
+def discrepancy_raiser(view: View, case: Change) -> Iterable[Effect]:
     """Closes a discrepancy beyond its bound and posts it one level up; after too many, it sees no way on.
 
     The level above measures it by its own means. As each level is asked only so often, the same failure is not answered
     in the same way for ever.
     """
-
-    level, priority = Level.PLAN, Priority.ENTER
-    on = (Watch(Discrepancy, where=lambda d: d.exceeds),)
-    writes = (Discrepancy, Impasse)
-
-    def act(self, view: View, case: Change) -> Iterable[Effect]:
-        found = case.entry
-        closed, raised = found.value.escalated()
-        sketch = deepest_sketch(view) if raised.level is Level.PLAN else None
-        tried, last = _describe_attempt(sketch), last_escalated(view, closed.level)
-        times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
-        counted = tuple(entry for entry in (sketch, last) if entry is not None)
-        close = Revise(found, replace(closed, tried=tried, times=times), (*found.because, *counted))
-        yield close
-        yield Post(raised, (close,))
-        most = MAX_CHECKS_PER_SUBGOAL if raised.level is Level.PLAN else MAX_LOST_PER_MISSION
-        if times >= most and not is_over(view):
-            kind, why = GIVEN_UP[raised.level]
-            yield Post(Impasse(kind, f"{why.format(times=times)} {closed.what}"), (close,))
+    found = case.entry
+    closed, raised = found.value.escalated()
+    sketch = deepest_sketch(view) if raised.level is Level.PLAN else None
+    tried, last = _describe_attempt(sketch), last_escalated(view, closed.level)
+    times = 1 + (last.value.times if last is not None and last.value.tried == tried else 0)
+    counted = tuple(entry for entry in (sketch, last) if entry is not None)
+    close = Revise(found, replace(closed, tried=tried, times=times), (*found.because, *counted))
+    yield close
+    yield Post(raised, (close,))
+    most = MAX_CHECKS_PER_SUBGOAL if raised.level is Level.PLAN else MAX_LOST_PER_MISSION
+    if times >= most and not is_over(view):
+        kind, why = GIVEN_UP[raised.level]
+        yield Post(Impasse(kind, f"{why.format(times=times)} {closed.what}"), (close,))
 
 
 def _describe_attempt(sketch: Entry[PlanSketch] | None) -> str:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from blackboard import Change, Decision, Effect, Level, Post, Posted, Ref, Retracted, Revise, Scheduler, View
-from knowledge_sources.goal.discrepancy_raiser import DiscrepancyRaiser
+from knowledge_sources.goal.discrepancy_raiser import discrepancy_raiser
 from strategies import Note, Scripted, levels, magnitudes, run
 from world_models.entries import LADDER, Discrepancy
 
@@ -89,7 +89,7 @@ class ServoMachine(RuleBasedStateMachine):
         self.found: dict[Ref, Discrepancy] = {}
         self.scheduler = Scheduler(
             [*map(worker, Level), *map(corrector, Level), *map(measurer, (Level.PLAN, Level.GOAL)),
-             DiscrepancyRaiser()],
+             discrepancy_raiser],
             sinks=[self.decisions.append], ladder=LADDER,
         )
 
@@ -159,7 +159,7 @@ def test_action_work_goes_before_plan_work_while_only_action_discrepancies_are_o
     plan = Scripted("planner", Note, level=Level.PLAN, rate=1.0)
     act = Scripted("driver", Discrepancy, correct, level=Level.ACTION, rate=0.1, writes=(Discrepancy,),
                  where=lambda d: d.is_open)
-    scheduler = Scheduler([plan, act, DiscrepancyRaiser()], ladder=LADDER)
+    scheduler = Scheduler([plan, act, discrepancy_raiser], ladder=LADDER)
     small = Discrepancy(Level.ACTION, "slightly off", 1.0, (2.0, 3.0), "px")
     scheduler.post([Post(Note("a")), Post(small)], "user")
     decisions = run(scheduler)
@@ -168,7 +168,7 @@ def test_action_work_goes_before_plan_work_while_only_action_discrepancies_are_o
 
 
 def test_an_action_discrepancy_beyond_its_bound_brings_the_plan_level_into_focus_once_it_is_raised() -> None:
-    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), DiscrepancyRaiser()], ladder=LADDER)
+    scheduler = Scheduler([corrector(Level.PLAN), measurer(Level.PLAN), discrepancy_raiser], ladder=LADDER)
     scheduler.post([Post(Discrepancy(Level.ACTION, "2.5", 2.5, (2.0, 3.0), "px"))], "user")
     decisions = run(scheduler)
     assert [(str(d.focus), d.chosen and d.chosen.source.name) for d in decisions] == [

@@ -12,14 +12,14 @@ from blackboard import Entry, Level
 from generated_boards import Bench, effect_on, poses, reasons, to_world
 from harvey.testing import check_source, plain_robot
 from knowledge_sources.methods.verification import MIN_MATCHED_LINES, turn_headings
-from knowledge_sources.milestone_selector.belief_checker import BeliefChecker
+from knowledge_sources.milestone_selector.belief_checker import belief_checker
 from knowledge_sources.reads import list_log_odds
 from knowledge_sources.reads.sketches import MAX_LOOK_LOG_ODDS
 from world_models.entries import Certificate, Discrepancy, Milestone
 from world_models.entries.task import MilestoneStatus
 from world_models.frames import Pose2, wrap_angle
 
-SOURCE = BeliefChecker()
+SOURCE = belief_checker
 FEW = MIN_MATCHED_LINES
 
 

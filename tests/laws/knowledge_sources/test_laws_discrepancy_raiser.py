@@ -7,10 +7,10 @@ import pytest
 from blackboard import Level, Revise
 from generated_boards import Bench, effect_on, made, reasons
 from harvey.testing import check_source
-from knowledge_sources.goal.discrepancy_raiser import MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION, DiscrepancyRaiser
+from knowledge_sources.goal.discrepancy_raiser import MAX_CHECKS_PER_SUBGOAL, MAX_LOST_PER_MISSION, discrepancy_raiser
 from world_models.entries import Discrepancy, Impasse, Outcome
 
-SOURCE = DiscrepancyRaiser()
+SOURCE = discrepancy_raiser
 BOUNDS = (5.0, 30.0)
 MOST = {Level.ACTION: MAX_CHECKS_PER_SUBGOAL, Level.PLAN: MAX_LOST_PER_MISSION}
 ABOVE = {Level.ACTION: Level.PLAN, Level.PLAN: Level.GOAL}
