@@ -6,12 +6,11 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
-from blackboard import Change, Effect, Entry, Level, Revise, Revised, View, Watch
+from blackboard import Change, Effect, Entry, Revise, Revised, View, Watch, rule
 from knowledge_sources.methods.motion import leads_through, meets
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, active_goal, find_robot
-from knowledge_sources.robot_knowledge_source import RobotKnowledgeSource
-from world_models.building.locale_frame import LocaleFrame
+from world_models.building.locale_frame import FrameRequest, LocaleFrame
 from world_models.entries import Milestone, Obstacle, PlanSketch, Track, Tracks
 
 
@@ -25,43 +24,18 @@ class Case(NamedTuple):
     tracks: Entry[Tracks] | None
 
 
-class DependencyWithdrawer(RobotKnowledgeSource):
-    """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
-
-    A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
-    where a landmark of it is gone: its place must be verified again. A sketch that led through a door that
-    is now shut, or round a thing that is now gone, is superseded; the goal sketcher draws another. So is one whose way
-    an obstacle blocks: it stands within the robot's radius and the least clearance of what is left of a leg.
-    """
-
-    level, priority = Level.ACTION, Priority.ENTER
-    on = (Watch(LocaleFrame, (Revised,)),)
-    writes = (Milestone, PlanSketch, Tracks)
-
-    def bind(self, view: View, trigger: Change) -> Case | None:
-        """What rested on what the frame no longer says."""
-        frame: Entry[LocaleFrame] = trigger.entry
-        superseded = _find_misled(view, frame)
-        misled = {sketch.id for sketch in superseded}
-        gone = tuple(entry for entry in view.all(Milestone) if _is_overtaken(entry, frame, misled))
-        unverified = {m.sketch for m in (entry.value for entry in gone) if m.status == "verified" and _holds(view, m)}
-        tracks = view.latest(Tracks)
-        is_lost = tracks is not None and len(_list_kept(tracks.value, frame.value)) < len(tracks.value.items)
-        left = tuple(view[id] for id in sorted(unverified - misled))
-        case = Case(frame, gone, superseded, left, tracks if is_lost else None)
-        return case if any(case[1:]) else None
-
-    def act(self, view: View, case: Case) -> Iterable[Effect]:
-        frame = case.frame
-        for milestone in case.milestones:
-            yield Revise(milestone, replace(milestone.value, status="withdrawn"), (frame,))
-        for sketch in case.superseded:
-            yield Revise(sketch, replace(sketch.value, status="superseded"), (frame,))
-        for sketch in case.unverified:
-            yield Revise(sketch, replace(sketch.value, verified=False), (frame,))
-        if case.tracks is not None:
-            tracks = case.tracks
-            yield Revise(tracks, replace(tracks.value, items=_list_kept(tracks.value, frame.value)), (frame,))
+def find_rested(view: View, trigger: Change) -> Case | None:
+    """What rested on what a frame no longer says."""
+    frame: Entry[LocaleFrame] = trigger.entry
+    superseded = _find_misled(view, frame)
+    misled = {sketch.id for sketch in superseded}
+    gone = tuple(entry for entry in view.all(Milestone) if _is_overtaken(entry, frame, misled))
+    unverified = {m.sketch for m in (entry.value for entry in gone) if m.status == "verified" and _holds(view, m)}
+    tracks = view.latest(Tracks)
+    is_lost = tracks is not None and len(_list_kept(tracks.value, frame.value)) < len(tracks.value.items)
+    left = tuple(view[id] for id in sorted(unverified - misled))
+    case = Case(frame, gone, superseded, left, tracks if is_lost else None)
+    return case if any(case[1:]) else None
 
 
 def _is_overtaken(entry: Entry[Milestone], frame: Entry[LocaleFrame], misled: Collection[str]) -> bool:
@@ -112,3 +86,24 @@ def _find_misled(view: View, frame: Entry[LocaleFrame]) -> tuple[Entry[PlanSketc
     if len(changed) < len(found) or not changed:  # something else differs too: a door, or what the file has
         is_misled = is_misled or any(leads_through(sketch.value, frame.value) for sketch in active)
     return active if is_misled else ()
+
+
+@rule(on=Watch(LocaleFrame, (Revised,)), writes=(Milestone, PlanSketch, Tracks, FrameRequest), bind=find_rested,
+      priority=Priority.ENTER)
+def dependency_withdrawer(_view: View, case: Case) -> Iterable[Effect]:
+    """Withdraws milestones, plan sketches and tracks that rested on what a frame no longer says.
+
+    A milestone that waits to be judged is withdrawn where its prediction rested on the frame; one that was verified,
+    where a landmark of it is gone: its place must be verified again. A sketch that led through a door that
+    is now shut, or round a thing that is now gone, is superseded; the goal sketcher draws another. So is one whose way
+    an obstacle blocks: it stands within the robot's radius and the least clearance of what is left of a leg.
+    """
+    frame, tracks = case.frame, case.tracks
+    for milestone in case.milestones:
+        yield Revise(milestone, replace(milestone.value, status="withdrawn"), (frame,))
+    for sketch in case.superseded:
+        yield Revise(sketch, replace(sketch.value, status="superseded"), (frame,))
+    for sketch in case.unverified:
+        yield Revise(sketch, replace(sketch.value, verified=False), (frame,))
+    if tracks is not None:
+        yield Revise(tracks, replace(tracks.value, items=_list_kept(tracks.value, frame.value)), (frame,))

@@ -15,7 +15,7 @@ from generated_boards import Bench, made, reasons, to_world
 from harvey.testing import HALL, STUDY, answer, check_source, plain_robot
 from knowledge_sources.methods.motion import CLEARANCES_M
 from knowledge_sources.methods.motion.ways_left import LEG_SLACK_M
-from knowledge_sources.model.dependency_withdrawer import DependencyWithdrawer
+from knowledge_sources.model.dependency_withdrawer import dependency_withdrawer
 from world_models.building.locale_frame import FrameChange, LocaleFrame
 from world_models.entries import Milestone, Obstacle, Place, PlanSketch, Subgoal, Track, Tracks, UserReport
 from world_models.entries.task import MilestoneStatus
@@ -72,7 +72,7 @@ def test_what_rested_on_a_frame_is_withdrawn_and_nothing_else(
             expected.add(entry.id)
             is_unverified |= status == "verified" and is_active and is_verified and index == 1
     trigger = Revised(frame)
-    answered = answer(DependencyWithdrawer(), View(board), trigger)
+    answered = answer(dependency_withdrawer, View(board), trigger)
     assert (answered is not None) == bool(expected)
     effects: list[Any] = list(answered or ())
     assert {e.entry.id for e in effects if e.value.__class__ is Milestone} == expected
@@ -110,7 +110,7 @@ def revise_for(
                                touched_s=touched_s, status=status))  # type: ignore[arg-type]
     changed, frame = FrameChange("extra", thing.value.name, "test", square(x_m, y_m)), bench.frame()
     (revised,) = bench.apply(Revise(frame, replace(frame.value, changes=(changed,)), (frame, thing)))
-    effects = bench.ask(DependencyWithdrawer(), revised.entry)
+    effects = bench.ask(dependency_withdrawer, revised.entry)
     assert all(reasons(effect) == {frame.id} for effect in effects or ())
     assert all(s.status == "superseded" for s in made(effects, PlanSketch))
     return {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
@@ -167,7 +167,7 @@ def test_a_way_through_a_door_that_was_found_shut_is_drawn_anew(passage: str, at
     thing = Obstacle("hall/obstacle-1", HALL, box, 0.02, 0.6, 3.6, 0.1)
     told, frame = [bench.put(said) for said in (UserReport("study-door", "shut"), thing)[:1 + is_found]], bench.frame()
     (revised,) = bench.apply(Revise(frame, replace(frame.value, changes=shut), (frame, *told)))
-    effects = bench.ask(DependencyWithdrawer(), revised.entry)
+    effects = bench.ask(dependency_withdrawer, revised.entry)
     misled = passage == "study-door" and at == 0
     ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
     assert ids == ({sketch.id for sketch in sketches} if misled else set()) and done.id not in ids
@@ -180,7 +180,7 @@ def test_a_way_across_a_room_that_was_rearranged_is_drawn_anew(what: Any, locale
     bench.believe()
     bench.sketch(FROM, MIDDLE, TO)
     changed = (FrameChange(what, f"{locale}/desk", "test"),) if what else ()
-    effects = bench.ask(DependencyWithdrawer(), bench.revise(bench.frame(locale), changes=changed))
+    effects = bench.ask(dependency_withdrawer, bench.revise(bench.frame(locale), changes=changed))
     assert bool(made(effects, PlanSketch)) == is_drawn_anew
 
 
@@ -194,7 +194,7 @@ def test_landmarks_that_are_gone_are_not_followed_and_the_others_are() -> None:
     for thing, kept in (("hall/desk-1", names[2:]), ("hall/rack", names[:3]), ("hall/lamp", names)):
         changed = replace(frame.value, changes=(FrameChange("gone", thing, "test"),))
         revised = Entry(frame.id, 1, changed, "test", 99)
-        effects = answer(DependencyWithdrawer(), bench.view, Revised(revised))
+        effects = answer(dependency_withdrawer, bench.view, Revised(revised))
         assert (effects is None) == (kept == names)
         for effect in effects or ():
             assert not isinstance(effect, Post) and effect.entry is tracks and effect.because == (revised,)
@@ -207,7 +207,7 @@ def test_a_milestone_of_a_sketch_that_is_drawn_anew_is_not_awaited() -> None:
     sketch = bench.sketch(FROM, TO)
     awaited, other = bench.await_milestone(sketch.id, 0), bench.await_milestone("PlanSketch-9", 0)
     gone = (FrameChange("gone", "hall/desk", "test"),)
-    effects = bench.ask(DependencyWithdrawer(), bench.revise(bench.frame(), changes=gone))
+    effects = bench.ask(dependency_withdrawer, bench.revise(bench.frame(), changes=gone))
     ids = {effect.entry.id for effect in effects or () if not isinstance(effect, Post)}
     assert ids == {awaited.id, sketch.id} and other.id not in ids
 
@@ -217,4 +217,4 @@ def test_it_keeps_the_laws_of_all_sources() -> None:
     bench.believe()
     bench.sketch(FROM, MIDDLE, TO)
     gone = (FrameChange("gone", "hall/desk", "test"),)
-    check_source(DependencyWithdrawer, bench, bench.revise(bench.frame(), changes=gone))
+    check_source(dependency_withdrawer, bench, bench.revise(bench.frame(), changes=gone))
