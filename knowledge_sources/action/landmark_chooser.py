@@ -19,6 +19,7 @@ from knowledge_sources.reads import (
     rests_on,
     take_new,
 )
+from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Drift, Hypothesis, Tracks
 
 
@@ -27,8 +28,8 @@ def find_followed_so_far(view: View, _trigger: Change) -> Following:
 
 
 @rule(on=Watch(Hypothesis, (Revised,), lambda h: h.is_held and h.basis in ("milestone", "relocalization")),
-      writes=(Tracks, Hypothesis, Drift), needs=(HELD, PICTURE, NOT_LOST, MEASURED), bind=find_followed_so_far,
-      priority=Priority.CORRECT, closes=Level.ACTION)
+      writes=(Tracks, Hypothesis, Drift, FrameRequest), needs=(HELD, PICTURE, NOT_LOST, MEASURED),
+      bind=find_followed_so_far, priority=Priority.CORRECT, closes=Level.ACTION)
 def landmark_chooser(view: View, case: Following) -> Iterable[Effect]:
     """Takes all landmarks again after a milestone or a relocalization.
 

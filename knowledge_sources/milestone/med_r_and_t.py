@@ -26,6 +26,7 @@ from knowledge_sources.methods.localization import CAMERA_LINE_SIGMA_PX, MIN_CAM
 from knowledge_sources.methods.pose import (
     CameraEstimate,
     PlanarEstimate,
+    Rests,
     compute_protection,
     estimate_camera_and_pose,
     planar_from_lines,
@@ -39,6 +40,8 @@ from world_models.frames import Pose2, frozen
 from world_models.robot import RobotModel
 
 Matched = tuple[Entry[LineMatch], Entry[Milestone]]
+PUT_DOWN = "command"
+"""Basis of a belief that nothing has moved since the robot was put down."""
 
 
 class MedRAndT(RobotKnowledgeSource):
@@ -86,11 +89,12 @@ class MedRAndT(RobotKnowledgeSource):
             spread = learnt.covariance if moves else known
             covariance = covariance + learnt.pose_slopes @ spread @ learnt.pose_slopes.T
         moved, near = learnt if moves else None, np.asarray(found.inliers, bool)
-        rests = belief.rests._replace(
-            lines_world=match.value.lines_world[near], segments_px=match.value.segments_px[near],
-            landmarks=[m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]],
-            camera=robot.camera, mount=robot.mount, step=np.zeros(len(known)) if moved is None else moved.step,
-            loosened=None if belief.rests.loosened is None else prior, camera_covariance=known,
+        rests = Rests(
+            match.value.lines_world[near], match.value.segments_px[near],
+            [m.landmarks[m.landmark_of[i]] for i in match.value.pairs[near, 0]], robot.camera, robot.mount,
+            np.zeros(len(known)) if moved is None else moved.step, here, belief.covariance,
+            None if belief.value.basis == PUT_DOWN else prior, known,
+            excess=(belief.value.excess_m, belief.value.excess_rad),
             walls=errors.take(np.flatnonzero(near)).list_walls())
         because = match, milestone, belief.entry, *view.where(Difference, lambda d: d.about == name_model(view))
         yield Post(

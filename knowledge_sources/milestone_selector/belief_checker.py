@@ -36,7 +36,7 @@ def belief_checker(view: View, _case: Change) -> Iterable[Effect]:
     heading = pose.heading_rad
     if tried:
         headings = find_untried(turn_headings(pose), tried) or [heading]
-        heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M, believed=belief.rests)
+        heading = choose_heading(robot, pose, headings, CHECK_TOLERANCE_M)
     what = f"the place where it believes to be, because {doubt.value.what}"
     check = Milestone("", -1, what, heading, tried=tried)
     yield Post(replace(check, log_odds_so_far=list_log_odds(view, check)), (doubt, belief.entry))

@@ -61,7 +61,7 @@ class ViewChooser(RobotKnowledgeSource):
         tried = find_tried(view, lambda m: (m.value.sketch, m.value.index) == (sketch.id, s.at))
         headings = find_untried(self.list_headings(robot.world, s, pose), tried)
         tolerance_m = s.subgoals[s.at - 1].tolerance_m if s.at else CHECK_TOLERANCE_M
-        heading = choose_heading(robot, pose, headings, tolerance_m, find_car(s, s.at), belief.rests)
+        heading = choose_heading(robot, pose, headings, tolerance_m, find_car(s, s.at))
         is_ahead = abs(wrap_angle(pose.heading_rad - heading)) <= MAX_LOOK_ERROR_RAD
         chosen = Milestone(sketch.id, s.at, f"M{s.at} of {s.locale or 'the route'}",
                            pose.heading_rad if is_ahead else heading, tried=tried)

@@ -8,6 +8,7 @@ from blackboard import Change, Effect, Entry, Level, Posted, Revise, Revised, Vi
 from knowledge_sources.methods.verification import list_seen_locales, predict_milestone
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import HELD, MILESTONE, find_car_of, find_frames
+from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Milestone, Obstruction
 
 
@@ -16,8 +17,8 @@ def find_unjudged(view: View, trigger: Change) -> Entry[Obstruction] | None:
     return trigger.entry if MILESTONE.of(view).value.status == "expected" else None
 
 
-@rule(on=Watch(Obstruction, (Posted, Revised)), writes=Milestone, needs=(HELD, MILESTONE), bind=find_unjudged,
-      priority=Priority.REVISE, level=Level.PLAN)
+@rule(on=Watch(Obstruction, (Posted, Revised)), writes=(Milestone, FrameRequest), needs=(HELD, MILESTONE),
+      bind=find_unjudged, priority=Priority.REVISE, level=Level.PLAN)
 def view_updater(view: View, case: Entry[Obstruction]) -> Iterable[Effect]:
     """Predicts a milestone again whose picture is taken, without what an obstruction hides that was just found."""
     hidden, milestone, belief = case, MILESTONE.of(view), HELD.of(view)

@@ -10,19 +10,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
 from blackboard import Condition, Entry, Level, View
 from knowledge_sources.methods.arrays import Floats
-from knowledge_sources.methods.calibration import compute_camera_covariance, loosen
-from knowledge_sources.methods.pose import Rests
-from knowledge_sources.reads.place_believed import was_put_down
 from knowledge_sources.reads.questions import (
     active_goal,
     deepest_sketch,
     find_belief,
     find_building,
-    find_camera,
     find_robot,
     find_robot_in,
     find_stop,
@@ -87,14 +81,6 @@ class Belief:
     def covariance(self) -> Floats:
         """(3, 3) over (x, y, heading), world frame."""
         return self.entry.value.covariance_world(self.world)
-
-    @cached_property
-    def rests(self) -> Rests:
-        """What a pose rests on before any line is seen: this belief, and what is known of the camera."""
-        known, b = compute_camera_covariance(find_camera(self.view)), self.value
-        return Rests(np.zeros((0, 2, 3)), np.zeros((0, 2, 2)), [], self.robot.camera, self.robot.mount,
-                     np.zeros(len(known)), self.pose, self.covariance, None if was_put_down(self.view, b)
-                     else loosen(self.covariance), known, excess=(b.excess_m, b.excess_rad))
 
     def moved_to(
         self, pose: Pose2, covariance: Floats, basis: str, *, locale: str = "", motion: str = ""

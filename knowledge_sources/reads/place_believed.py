@@ -22,7 +22,6 @@ from knowledge_sources.methods.verification import P_WRONG_STANDING, Weighed, co
 from knowledge_sources.reads.questions import find_building, find_camera, find_robot_in, open_discrepancy
 from world_models.entries import (
     AliasOdds,
-    Certificate,
     Discrepancy,
     Hypothesis,
     MotionReport,
@@ -111,14 +110,6 @@ def has_only_turned(view: View, belief: Hypothesis) -> bool:
     way = view.latest(Travel)
     return belief.basis in PLACED_BY or (
         way is not None and not way.value.is_broken and way.value.gone_m <= MAX_STANDING_M)
-
-
-def was_put_down(view: View, belief: Hypothesis) -> bool:
-    """Whether nothing but a turn on the spot came since the robot was put down."""
-    if belief.basis in PLACED_BY:
-        return belief.basis == PLACED_BY[0]
-    is_known = bool(view.latest(Certificate, lambda c: c.verdict == "verified") or view.latest(PlaceSearch))
-    return not is_known and has_only_turned(view, belief)
 
 
 class AliasRisk(NamedTuple):

@@ -10,6 +10,7 @@ from blackboard import Change, Effect, Entry, Level, Posted, Revise, View, Watch
 from knowledge_sources.methods.calibration import compute_camera_covariance, learn
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import CAMERA
+from world_models.building.locale_frame import FrameRequest
 from world_models.camera import YAW
 from world_models.entries import CameraState, Certificate, PoseFix, Travel, begin_travel
 
@@ -22,7 +23,7 @@ def find_learnt(view: View, trigger: Change) -> Verified | None:
     return None if fix is None or not fix.value.camera_step else (trigger.entry, fix)
 
 
-@rule(on=Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"), writes=(CameraState, Travel),
+@rule(on=Watch(Certificate, (Posted,), lambda c: c.verdict == "verified"), writes=(CameraState, Travel, FrameRequest),
       needs=(CAMERA,), bind=find_learnt, priority=Priority.ENTER, level=Level.PLAN)
 def camera_calibrator(view: View, case: Verified) -> Iterable[Effect]:
     """Takes over what the lines of a verified milestone say of the camera: tilt, roll, height, lens.

@@ -15,6 +15,7 @@ from knowledge_sources.reads import HELD, add_reports, is_worth_telling
 from knowledge_sources.reads.motion_between import MOTION, SHARED_SIGMA_RAD, WHEELS_PART, has_moved_standing, list_asked
 from knowledge_sources.reads.place_believed import MAX_P_RIVAL
 from world_models.actuator import ActuatorModel
+from world_models.building.locale_frame import FrameRequest
 from world_models.entries import (
     LAST_REPORTS,
     SHARED_SIGMA_M,
@@ -138,8 +139,8 @@ def _log_density(off: Floats, covariance: Floats) -> float:
     return -0.5 * float(off @ np.linalg.solve(covariance, off) + np.linalg.slogdet(covariance)[1])
 
 
-@rule(on=Watch(Certificate, (Posted,), tells_place), writes=Evidence, needs=(HELD,), bind=find_otherwise,
-      priority=Priority.ENTER, level=Level.PLAN)
+@rule(on=Watch(Certificate, (Posted,), tells_place), writes=(Evidence, FrameRequest), needs=(HELD,),
+      bind=find_otherwise, priority=Priority.ENTER, level=Level.PLAN)
 def correction_monitor(_view: View, case: Post) -> Iterable[Effect]:
     """Says where the motion from one picture to the next is not the one that the wheels counted."""
     yield case

@@ -17,6 +17,7 @@ from knowledge_sources.methods.calibration import (
 )
 from knowledge_sources.priority import Priority
 from knowledge_sources.reads import CAMERA, HELD, is_worth_telling
+from world_models.building.locale_frame import FrameRequest
 from world_models.entries import Evidence, PoseFix
 
 ABOUT = "camera"
@@ -48,8 +49,8 @@ def find_bent(view: View, trigger: Change) -> Post | None:
     return Post(told, (entry, match, milestone))
 
 
-@rule(on=Watch(PoseFix, (Posted,)), writes=Evidence, needs=(HELD, CAMERA), bind=find_bent, priority=Priority.ENTER,
-      level=Level.PLAN)
+@rule(on=Watch(PoseFix, (Posted,)), writes=(Evidence, FrameRequest), needs=(HELD, CAMERA),
+      bind=find_bent, priority=Priority.ENTER, level=Level.PLAN)
 def lens_monitor(_view: View, case: Post) -> Iterable[Effect]:
     """Says what the residuals of a pose fix tell of the camera, before the fix is judged."""
     yield case

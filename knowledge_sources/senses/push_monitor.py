@@ -16,6 +16,7 @@ from knowledge_sources.priority import Priority
 from knowledge_sources.reads import CAMERA, HELD, add_reports
 from knowledge_sources.reads.motion_between import SHARED_SIGMA_RAD, is_broken, list_reports
 from knowledge_sources.reads.questions import WORTH_TELLING
+from world_models.building.locale_frame import FrameRequest
 from world_models.camera import YAW
 from world_models.entries import SHARED_SIGMA_M, Drift, Evidence, Explanation, FloorView
 from world_models.frames import Pose2
@@ -71,7 +72,8 @@ def _weigh(view: View, then: Entry[FloorView], now: Entry[FloorView]) -> tuple[f
     return float(np.linalg.norm(off[:2])), hedge({"pushed": 0.5 * float(plain - pushed)})["pushed"]
 
 
-@rule(on=Watch(FloorView, (Posted,)), writes=Evidence, needs=(HELD, CAMERA), bind=find_step, priority=Priority.ENTER)
+@rule(on=Watch(FloorView, (Posted,)), writes=(Evidence, FrameRequest), needs=(HELD, CAMERA), bind=find_step,
+      priority=Priority.ENTER)
 def push_monitor(_view: View, case: Post) -> Iterable[Effect]:
     """Says where the robot was pushed, or its wheels slipped, though a look has set that right."""
     yield case

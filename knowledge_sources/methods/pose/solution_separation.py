@@ -56,7 +56,6 @@ class Rests(NamedTuple):
         excess: by how much the protection level of the belief is above that covariance [m, rad]: what is false now was
             so when it came to be believed.
         walls: by name, (n, 3) by how much each line moves with a wall along its normal, with all that is on it [m].
-        is_seen: whether a picture shows the lines so; else it is what one should show, and they scatter as expected.
     """
 
     lines_world: Floats
@@ -73,7 +72,6 @@ class Rests(NamedTuple):
     model_m: float = 0.0
     excess: tuple[float, float] = (0.0, 0.0)
     walls: Sequence[tuple[str, Floats]] = ()
-    is_seen: bool = True
 
 
 def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protection:
@@ -82,7 +80,7 @@ def compute_protection(pose: Pose2, covariance: Floats, rests: Rests) -> Protect
         return _measure(NOISE, np.zeros(POSE), covariance, count_sigmas(1))
     distances, slopes = _measure_lines(pose, rests)
     said = LINE_SIGMA_FREEDOM * LINE_SIGMA_PX**2 + float(np.sum(distances**2))  # as expected, and as the lines scatter
-    variance = said / (LINE_SIGMA_FREEDOM + max(distances.size - POSE, 0) * rests.is_seen)
+    variance = said / (LINE_SIGMA_FREEDOM + max(distances.size - POSE, 0))
     hessians = np.einsum("nea,neb->nab", slopes, slopes) / variance
     gradients = np.einsum("nea,ne->na", slopes, distances) / variance
     offset = np.concatenate([pose.minus(rests.belief), rests.step])[FREE]

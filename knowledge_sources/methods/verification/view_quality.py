@@ -10,17 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from knowledge_sources.methods.features import SIGMA_ACROSS_PX
-from knowledge_sources.methods.pose import Rests, compute_protection
 from knowledge_sources.methods.verification.line_check import (
     ViewQuality,
     compute_view_quality,
     find_errors,
-    list_names,
     predict_lines,
 )
 from knowledge_sources.methods.verification.predicted_colors import predict_face_colors
 from world_models.building.model_errors import MEASURED_M, pack_errors
-from world_models.entries import ALERT_LIMIT_M, Milestone, Protection
+from world_models.entries import Milestone
 from world_models.frames import Pose2, wrap_angle
 from world_models.robot import RobotModel
 from world_models.visibility.lines_and_points import VisibleLines
@@ -33,7 +31,6 @@ MAX_COUNTED_CONTRAST = 0.3  # a line of more contrast than this is no clearer th
 MAX_SIGMA_PART = 0.3  # a view is good if it tells the place to this part of the subgoal's tolerance
 MAX_SIGMA_RAD = math.radians(0.25)  # a view is good if it tells the heading to this standard deviation
 MIN_LINES = 10  # fewest lines of a good view
-SURE_PART = 0.8  # up to this part of a limit a predicted level is surely within it: not all is found that should be
 CHECK_TOLERANCE_M = 0.1  # tolerance that a view is chosen by where no subgoal states one
 MIN_LOOK_DIFFERENCE_RAD = math.radians(20.0)  # looks whose directions differ by less show much the same
 
@@ -56,34 +53,19 @@ def list_seen_locales(robot: RobotModel, pose: Pose2, locale: str) -> set[str]:
     return {locale, *(name for mark in marks for name in (mark.locale, mark.neighbour) if name)}
 
 
+
 def choose_heading(
     robot: RobotModel, pose: Pose2, headings: Iterable[float], tolerance_m: float, car: str = "",
-    believed: Rests | None = None,
 ) -> float:
-    """The first heading whose view is good enough for a tolerance, else the best one [rad, world].
-
-    With what is ``believed`` before the look, the first good one by which the place is surely within the alert limit,
-    whatever single thing is false; where there is none, the first by which it is nearly as well known as by any.
-    """
-    rated, good = list[tuple[ViewQuality, float]](), list[tuple[float, float]]()
+    """The first heading whose view is good enough for a tolerance, else the best one [rad, world]."""
+    rated: list[tuple[ViewQuality, float]] = []
     for heading in headings:
-        rated.append((_compute_quality(robot, there := Pose2(pose.x_m, pose.y_m, heading), car), heading))
-        if is_good_view(rated[-1][0], tolerance_m):
-            good.append((predict_protection(robot, there, believed, car).place_m if believed else 0.0, heading))
-            if good[-1][0] <= SURE_PART * ALERT_LIMIT_M:
-                return heading
-    if good:
-        return next(heading for level_m, heading in good if SURE_PART * level_m <= min(good)[0])
+        quality = _compute_quality(robot, Pose2(pose.x_m, pose.y_m, heading), car)
+        if is_good_view(quality, tolerance_m):
+            return heading
+        rated.append((quality, heading))
     best = min(range(len(rated)), key=lambda i: (rated[i][0].lines < MIN_LINES, rated[i][0].sigma_m, i))
     return rated[best][1]
-
-
-def predict_protection(robot: RobotModel, pose: Pose2, believed: Rests, car: str = "") -> Protection:
-    """The protection level that a look from a pose (world) should have, with what is believed before it."""
-    lines = _predict_clear_lines(robot, pose, car)
-    return compute_protection(pose, np.zeros((3, 3)), believed._replace(
-        lines_world=lines.lines_world, segments_px=lines.segments_px, landmarks=list_names(lines), belief=pose,
-        walls=find_errors(robot, lines, MEASURED_M).list_walls(), is_seen=False))
 
 
 def is_good_view(quality: ViewQuality, tolerance_m: float) -> bool:
