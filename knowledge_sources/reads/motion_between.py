@@ -81,6 +81,8 @@ def has_moved_standing(view: View) -> bool | None:
     pictures, report = [entry.value for entry in islice(view.newest_first(CameraPicture), 2)], view.latest(MotionReport)
     if len(pictures) < 2 or report is None or rolling_course(view) is not None:
         return None
+    if not all(picture.jpeg for picture in pictures):  # a recorded run is asked without its pictures
+        return None
     last_s, first_s = (picture.sim_time_s - report.value.sim_time_s for picture in pictures)
     if not 0.0 <= first_s < last_s <= MAX_STOOD_S:
         return None
